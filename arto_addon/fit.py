@@ -1,0 +1,27 @@
+"""Fitting the scene's capture set (paper 5); the work itself is `core.fit`."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..core.capture_set import CaptureSet
+from ..core.fit import fit as fit_captured
+from . import paths
+from .capture import check_same_shot
+from .work import Progress, Steps
+
+
+def fit(scene: bpy.types.Scene) -> Steps:
+    """Fit the scene's capture set to a reflectance field; returns its folder.
+
+    Raises CaptureSetError, FieldError, PatternError; a field that was there stays until the new
+    one is complete.
+    """
+    captured = CaptureSet(paths.capture_folder(scene))
+    check_same_shot(scene, captured.head, "the capture set")
+    folder = paths.field_folder(scene)
+    about = {"shot": captured.head.get("shot", {})}
+    for share, text in fit_captured(captured, folder, scene.arto.support, **about):
+        yield Progress(share, text)
+    yield Progress(1.0, f"fitted {len(captured.hemicube)} patches of {captured.pixels} pixels")
+    return folder

@@ -1,0 +1,185 @@
+"""The settings on `scene.arto`."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+from ..core.choice import CHOICES
+from ..core.hemicube import FACE_NAMES, PRESETS
+from ..core.patterns import PATTERN_SETS
+
+_PATTERN_TEXT = {
+    "moments": ("1, u, u², v, v²", "Five patterns that identify a box"),
+    "moments_uv": ("1, u, u², v, v², uv", "Six patterns that also show a tilt"),
+    "paper": ("Paper's nine", "White, four diagonal gradients and their inverses"),
+    "white": ("White only", "One pattern: a reflection coefficient and no support"),
+}
+_SUPPORT_TEXT = {
+    "auto": ("Automatic", "The smallest model that explains each pixel and patch"),
+    "whole": ("Whole Patch", "Every direction of a patch counts the same (Light Stage)"),
+    "linear": ("Linear", "The light taken as a plane over each patch"),
+    "box": ("Box", "The paper's axis-aligned rectangle, in closed form"),
+}
+
+
+def _title(name: str) -> str:
+    return name.replace("_", " ").title()
+
+
+def _preset_chosen(self: ArtoSettings, context: bpy.types.Context) -> None:
+    if self.preset in PRESETS:
+        self["faces"] = sum(1 << FACE_NAMES.index(f) for f in PRESETS[self.preset])
+        self["half_sides"] = self.preset == "paper"
+
+
+class ArtoSettings(bpy.types.PropertyGroup):
+    """What the artist may choose; capture, fit and relight read it."""
+
+    preset: EnumProperty(
+        name="Preset",
+        description="Which directions the light comes from",
+        items=[
+            ("full", "Full Cube", "Six faces: any HDRI, whole"),
+            ("paper", "Paper's Monitors", "Top, left, right and back, above the horizon"),
+            ("custom", "Custom", "Choose the faces"),
+        ],
+        default="full",
+        update=_preset_chosen,
+    )
+    faces: EnumProperty(
+        name="Faces",
+        description="Faces of the hemicube that carry patches; the camera looks towards Back",
+        items=[(f, f.title(), f"The {f} face", 1 << i) for i, f in enumerate(FACE_NAMES)],
+        options={"ENUM_FLAG"},
+        default=set(FACE_NAMES),
+    )
+    patches: IntProperty(
+        name="Patches a Side",
+        description="Patches along the edge of a face (the paper: 4). More see finer light, "
+        "and each is noisier",
+        min=1,
+        max=16,
+        default=4,
+    )
+    half_sides: BoolProperty(
+        name="Half-Height Sides",
+        description="The four sides only above the horizon",
+        default=False,
+    )
+    align: EnumProperty(
+        name="Align",
+        description="Where the hemicube's Back is",
+        items=[
+            ("world", "World", "Along the world's Y axis"),
+            ("camera", "Camera", "Where the camera looks, level"),
+        ],
+        default="world",
+    )
+    rotation: FloatProperty(
+        name="Rotation",
+        description="Turn of the hemicube about the vertical, on top of Align",
+        subtype="ANGLE",
+        soft_min=-math.pi,
+        soft_max=math.pi,
+        default=0.0,
+    )
+    far: BoolProperty(
+        name="Far Away",
+        description="1,000 times the scene's radius: the light is as good as infinitely far, "
+        "like an HDRI. Off: a real set of monitors of the given size",
+        default=True,
+    )
+    size: FloatProperty(
+        name="Size",
+        description="Distance from the centre to a face, where the hemicube is not far away",
+        subtype="DISTANCE",
+        min=1e-4,
+        default=10.0,
+    )
+    patterns: EnumProperty(
+        name="Patterns",
+        description="What the patches show",
+        items=[(n, *_PATTERN_TEXT.get(n, (_title(n), ""))) for n in PATTERN_SETS],
+        default="moments",
+    )
+    route: EnumProperty(
+        name="Renders",
+        description="How the patches and patterns are told apart",
+        items=[
+            ("all", "One", "All patches and patterns in one render, by light groups"),
+            ("pattern", "One a Pattern", "A light group for each patch"),
+            ("single", "One a Patch and Pattern", "As in the paper; slow"),
+        ],
+        default="all",
+    )
+    samples: IntProperty(
+        name="Samples",
+        description="Samples of the capture. Its noise is the main error of the relit picture",
+        min=1,
+        max=1 << 20,
+        default=128,
+    )
+    seed: IntProperty(name="Seed", description="Seed of the capture's noise", min=0, default=0)
+    memory: IntProperty(
+        name="Memory Budget",
+        description="Megabytes that the passes of one render may take; a larger picture is "
+        "captured in tiles",
+        min=16,
+        default=4096,
+    )
+    support: EnumProperty(
+        name="Support",
+        description="How the light within a patch is filtered",
+        items=[(n, *_SUPPORT_TEXT.get(n, (_title(n), ""))) for n in CHOICES],
+        default="auto",
+    )
+    own_lamps: FloatProperty(
+        name="Scene's Own Lamps",
+        description="How much of the scene's own lamps and emitters the relit picture has",
+        min=0.0,
+        soft_max=2.0,
+        default=1.0,
+    )
+    environment_width: IntProperty(
+        name="World Resolution",
+        description="Width in pixels that the world is brought to before relighting. Mirrors "
+        "show no more detail than this",
+        min=64,
+        max=16384,
+        default=1024,
+    )
+    folder: StringProperty(
+        name="Folder",
+        description="Where capture sets and fields are kept, in a folder named after the scene",
+        subtype="DIR_PATH",
+        default="//arto/",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    output: StringProperty(
+        name="Relit Picture",
+        description="The relit EXR; empty: beside the .blend, named after it",
+        subtype="FILE_PATH",
+        default="",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+
+
+CLASSES = (ArtoSettings,)
+
+
+def attach() -> None:
+    bpy.types.Scene.arto = PointerProperty(type=ArtoSettings)
+
+
+def detach() -> None:
+    del bpy.types.Scene.arto

@@ -1,0 +1,58 @@
+"""Relighting: the scene's world through the field, into an EXR and the compositor (paper 6)."""
+
+from __future__ import annotations
+
+import time
+
+import bpy
+
+from ..core.field import Field
+from ..core.light import PatchLight
+from ..core.relight import over
+from ..core.relight import relight as relight_field
+from . import paths, plate
+from .capture import check_same_shot
+from .work import Progress, Steps
+from .world import background, bake, check_world
+
+
+def relight(scene: bpy.types.Scene) -> Steps:
+    """Relight the scene's field with its world; returns (path of the EXR, seconds by part).
+
+    Raises SceneError, FieldError, ExrError; nothing of the scene changes but the image
+    `ARTO Relit` and its node in the compositor.
+    """
+    check_world(scene)
+    settings = scene.arto
+    path = paths.relit_file(scene)
+    field = Field(paths.field_folder(scene))
+    check_same_shot(scene, field.about, "the reflectance field")
+    seconds: dict[str, float] = {}
+    last = time.perf_counter()
+
+    def lap(name: str) -> None:
+        nonlocal last
+        now = time.perf_counter()
+        seconds[name] = now - last
+        last = now
+
+    yield Progress(0.0, "bringing the world to an environment map")
+    environment = bake(scene, settings.environment_width)
+    lap("world")
+    yield Progress(0.4, "bringing the environment to the patches")
+    light = PatchLight(environment, field.hemicube)
+    lap("light")
+    yield Progress(0.6, "relighting")
+    picture = relight_field(field, light, settings.own_lamps)
+    lap("relight")
+    if not scene.render.film_transparent:
+        yield Progress(0.8, "adding the world behind")
+        picture = over(picture, background(scene))
+        lap("background")
+    yield Progress(0.9, f"writing {path}")
+    world = scene.world.name if scene.world else ""
+    plate.write(path, picture, {"scene": scene.name, "world": world})
+    plate.wire(scene, plate.node_group(plate.show(path)))
+    lap("write")
+    yield Progress(1.0, f"wrote {path}")
+    return path, seconds

@@ -1,0 +1,120 @@
+"""The stage: a copy of the artist's scene in which everything may be changed.
+
+Capturing switches off whatever bends the light and hangs a few hundred patches around the scene.
+None of it happens to the artist's scene: it happens to a copy that shares its objects, and the
+copy is thrown away on every way out. There is nothing to put back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import bpy
+
+from ..core.errors import SceneError
+from ..core.field import Region
+
+# What carries light out of a render besides Combined and is of no use here.
+_KEEP_PASSES = {"use_pass_combined", "use_pass_z"}
+
+
+class Stage:
+    """The copied scene, and the data-blocks that live as long as it does."""
+
+    def __init__(self, scene: bpy.types.Scene) -> None:
+        self.scene = scene
+        self.changed: dict[str, list[Any]] = {}
+        self._made: list[bpy.types.ID] = []
+
+    def made(self, block: Any) -> Any:
+        """Note a new data-block, so that it goes when the stage goes."""
+        self._made.append(block)
+        return block
+
+    def remove(self, blocks: list[bpy.types.ID]) -> None:
+        """Remove some of them early."""
+        gone = {b.as_pointer() for b in blocks}
+        self._made = [b for b in self._made if b.as_pointer() not in gone]
+        bpy.data.batch_remove(blocks)
+
+    def change(self, path: str, value: Any) -> None:
+        """Set `scene.<path>`, and note what it was, for the capture set's description."""
+        *owners, name = path.split(".")
+        target: Any = self.scene
+        for owner in owners:
+            target = getattr(target, owner)
+        before = getattr(target, name)
+        if before != value:
+            setattr(target, name, value)
+            self.changed[path] = [before, value]
+
+    def clear(self) -> None:
+        bpy.data.batch_remove([*self._made, self.scene])
+
+
+@contextmanager
+def stage(scene: bpy.types.Scene, view_layer: str) -> Iterator[Stage]:
+    """A copy of `scene` with only `view_layer` in use, without compositing and extra passes."""
+    if not scene.view_layers.get(view_layer):
+        raise SceneError(f"the scene has no view layer '{view_layer}'")
+    copy = scene.copy()
+    out = Stage(copy)
+    try:
+        copy.frame_set(scene.frame_current, subframe=scene.frame_subframe)
+        for layer in list(copy.view_layers):
+            if layer.name != view_layer:
+                copy.view_layers.remove(layer)
+        layer = copy.view_layers[0]
+        for prop in layer.bl_rna.properties:
+            if prop.identifier.startswith("use_pass_"):
+                setattr(layer, prop.identifier, prop.identifier in _KEEP_PASSES)
+        for prop in layer.cycles.bl_rna.properties:
+            if prop.identifier.startswith("use_pass_") or prop.identifier.startswith("pass_debug"):
+                setattr(layer.cycles, prop.identifier, False)
+        while layer.aovs:
+            layer.aovs.remove(layer.aovs[0])
+        # the artist's own light groups would only cost memory here
+        while layer.lightgroups:
+            layer.lightgroups.remove(layer.lightgroups[0])
+        copy.render.use_compositing = False
+        copy.render.use_sequencer = False
+        copy.render.use_multiview = False
+        copy.render.use_overwrite = True
+        copy.render.use_placeholder = False
+        copy.render.use_file_extension = False
+        copy.render.use_freestyle = False
+        yield out
+    finally:
+        out.clear()
+
+
+def float_exr(render: bpy.types.RenderSettings, multilayer: bool = True) -> None:
+    """Set a scene's output to 32-bit float EXR."""
+    settings = render.image_settings
+    settings.media_type = "MULTI_LAYER_IMAGE" if multilayer else "IMAGE"
+    settings.file_format = "OPEN_EXR_MULTILAYER" if multilayer else "OPEN_EXR"
+    settings.color_mode = "RGBA"
+    settings.color_depth = "32"
+    settings.exr_codec = "NONE" if multilayer else "ZIP"
+    settings.color_management = "FOLLOW_SCENE"
+
+
+def picture_size(scene: bpy.types.Scene) -> tuple[int, int]:
+    """(width, height) in pixels of a render of the scene."""
+    r = scene.render
+    share = r.resolution_percentage
+    return r.resolution_x * share // 100, r.resolution_y * share // 100
+
+
+def set_region(scene: bpy.types.Scene, region: Region) -> None:
+    """Make the scene render just this region, cropped."""
+    width, height = picture_size(scene)
+    r = scene.render
+    r.use_border = r.use_crop_to_border = (region.width, region.height) != (width, height)
+    # a hundredth of a pixel inside, so that rounding cannot lose a row
+    r.border_min_x = (region.x + 0.01) / width
+    r.border_max_x = (region.x + region.width + 0.01) / width
+    r.border_min_y = (height - region.y - region.height + 0.01) / height
+    r.border_max_y = (height - region.y + 0.01) / height

@@ -1,0 +1,96 @@
+"""Long work as a generator of steps, and the two ways to drive it.
+
+A piece of work yields `Progress` and `Render`. In batch the steps run one after the other and a
+render blocks; behind a button each timer tick takes one step, a render is Blender's own job with
+its progress bar and ESC, and the work waits for it. Cleaning up is the generator's own `finally`,
+so there is one way out however it ends.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, field
+from typing import Any
+
+import bpy
+
+from ..core.errors import CancelledError, SceneError
+
+
+@dataclass
+class Progress:
+    """share: how much is done, 0 to 1; text: what is being done."""
+
+    share: float
+    text: str
+
+
+@dataclass
+class Render:
+    """A render of a scene into its output path, to be done before the next step."""
+
+    scene: str
+    share: float
+    text: str
+    state: str = field(default="waiting")  # then "done" or "cancelled"
+
+    def check(self) -> None:
+        """Raise CancelledError unless the render came to its end."""
+        if self.state != "done":
+            raise CancelledError("cancelled: finished tiles are kept, run it again to go on")
+
+
+Steps = Generator[Progress | Render, None, Any]
+
+
+def blocking_render(request: Render) -> None:
+    """Render here and now."""
+    ended: list[str] = []
+
+    def on_cancel(*_: object) -> None:
+        ended.append("cancelled")
+
+    bpy.app.handlers.render_cancel.append(on_cancel)
+    try:
+        result = bpy.ops.render.render(write_still=True, scene=request.scene)
+    except KeyboardInterrupt:
+        result = {"CANCELLED"}
+    except RuntimeError as e:
+        raise SceneError(f"Cycles could not render: {e}") from e
+    finally:
+        bpy.app.handlers.render_cancel.remove(on_cancel)
+    request.state = "cancelled" if ended or "FINISHED" not in result else "done"
+
+
+def run(steps: Steps, say: Callable[[Progress | Render], None] | None = None) -> Any:
+    """Drive the work to its end, blocking; returns what it returns."""
+    try:
+        while True:
+            step = next(steps)
+            if say:
+                say(step)
+            if isinstance(step, Render):
+                blocking_render(step)
+    except StopIteration as end:
+        return end.value
+    except KeyboardInterrupt:
+        raise CancelledError("cancelled: finished tiles are kept, run it again to go on") from None
+    finally:
+        steps.close()
+
+
+class ProgressLines:
+    """Prints progress for batch runs: every new thing being done, and each tenth of it."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.last = ("", -1)
+        self.begun = time.perf_counter()
+
+    def __call__(self, step: Progress | Render) -> None:
+        now = (step.text, int(step.share * 10))
+        if now != self.last:
+            self.last = now
+            seconds = time.perf_counter() - self.begun
+            print(f"ARTO {self.name}: {step.share:4.0%} {step.text} ({seconds:.1f} s)", flush=True)

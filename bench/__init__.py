@@ -1,0 +1,1 @@
+"""Measuring ARTO: `python -m bench --help`."""

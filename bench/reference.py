@@ -1,0 +1,130 @@
+"""Reference renders: what Cycles itself shows under a world, kept by content.
+
+A reference is named by a hash of everything that decides it (the scene's script, the world, the
+size, samples and seed, Blender's version), so none is rendered twice and none is used for another.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from arto.arto_addon.stage import float_exr
+from arto.core import exr
+
+from . import scenes
+
+CACHE = Path("out/references")
+
+
+@dataclass(frozen=True)
+class World:
+    """A world to light a scene with: one of Blender's HDRIs, turned, or the paper's right side."""
+
+    name: str
+    degrees: float = 0.0
+
+    @property
+    def label(self) -> str:
+        return self.name + (f"+{self.degrees:g}" if self.degrees else "")
+
+    def apply(self, scene: bpy.types.Scene) -> None:
+        if self.name == "right":
+            scenes.set_world_right(scene)
+        elif self.name == "white":
+            scene.world = bpy.data.worlds.new("white")
+            background = scene.world.node_tree.nodes["Background"]
+            background.inputs["Color"].default_value = (1, 1, 1, 1)
+        else:
+            scenes.set_world_hdri(scene, self.name, rotation_degrees=self.degrees)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A finished render: rgb (H, W, 3) with the world behind, alpha and material index (H, W)."""
+
+    rgb: NDArray[np.float32]
+    alpha: NDArray[np.float32]
+    index: NDArray[np.int32]
+    seconds: float
+
+
+def new_scene(name: str, width: int, height: int) -> bpy.types.Scene:
+    """One of `scenes.SCENES`, from nothing, with ARTO's settings on it."""
+    scene = scenes.SCENES[name](width=width, height=height)
+    if not hasattr(bpy.types.Scene, "arto"):
+        import arto
+
+        arto.register()
+    return scene
+
+
+def render(scene: bpy.types.Scene, samples: int, seed: int, denoise: bool = False) -> Picture:
+    """Render the scene as it is, with that many samples, transparent, without clamping."""
+    cycles, settings = scene.cycles, scene.render
+    cycles.samples, cycles.seed = samples, seed
+    cycles.use_denoising = denoise
+    cycles.use_adaptive_sampling = False
+    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0
+    layer = scene.view_layers[0]
+    layer.use_pass_object_index = True
+    settings.film_transparent = True
+    float_exr(settings)
+    path = Path(bpy.app.tempdir) / "reference.exr"
+    settings.filepath, settings.use_file_extension = str(path), False
+    begun = time.perf_counter()
+    bpy.ops.render.render(write_still=True, scene=scene.name)
+    seconds = time.perf_counter() - begun
+    parts = {name.rsplit(".", 1)[-1]: pixels for name, pixels in exr.read(path).items()}
+    combined = parts["Combined"]
+    index = np.rint(parts["Object Index"][..., 0]).astype(np.int32)
+    return Picture(combined[..., :3], combined[..., 3], index, seconds)
+
+
+def content_key(**decides: Any) -> str:
+    """A name for what these values, the scenes' script and Blender's version decide."""
+    script = Path(scenes.__file__).read_bytes()
+    text = json.dumps([bpy.app.version_string, decides], sort_keys=True).encode()
+    return hashlib.sha256(script + text).hexdigest()[:20]
+
+
+def reference(
+    scene_name: str,
+    world: World,
+    size: tuple[int, int],
+    samples: int,
+    seed: int,
+    make: Callable[[], bpy.types.Scene],
+    denoise: bool = False,
+) -> Picture:
+    """The picture of a scene under a world, from the cache or rendered now (`make` the scene)."""
+    key = content_key(
+        scene=scene_name, world=world.label, size=size, samples=samples, seed=seed, denoise=denoise
+    )
+    path = CACHE / f"{scene_name}_{world.label}_{samples}_{key}.npz"
+    if path.is_file():
+        with np.load(path) as f:
+            return Picture(f["rgb"], f["alpha"], f["index"], float(f["seconds"]))
+    scene = make()
+    world.apply(scene)
+    picture = render(scene, samples, seed, denoise)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_suffix(".part.npz")
+    np.savez(
+        partial,
+        rgb=picture.rgb,
+        alpha=picture.alpha,
+        index=picture.index,
+        seconds=np.float64(picture.seconds),
+    )
+    partial.replace(path)
+    return picture

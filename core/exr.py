@@ -1,0 +1,170 @@
+"""The one door to EXR files. Rows run top-down, as in the file; data is float32 unless it was half.
+
+Blender carries an OpenEXR of its own whose symbols the wheel's library would otherwise find first:
+compressed reads then report errors for good pixels. Loading the wheel with its own symbols first
+(RTLD_DEEPBIND, Linux) keeps the two apart.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import ExrError
+
+_RGB = {("B", "G", "R"): "RGB", ("A", "B", "G", "R"): "RGBA", ("X", "Y", "Z"): "XYZ"}
+# What a colour space is called in an EXR header (colorInteropID), by Blender's name for it.
+COLOUR_SPACES = {
+    "Linear Rec.709": "lin_rec709_scene",
+    "Linear Rec.2020": "lin_rec2020_scene",
+    "ACEScg": "lin_ap1_scene",
+}
+
+
+def _openexr() -> Any:
+    if "OpenEXR" in sys.modules or not hasattr(os, "RTLD_DEEPBIND"):
+        import OpenEXR
+
+        return OpenEXR
+    flags = sys.getdlopenflags()
+    sys.setdlopenflags(flags | os.RTLD_DEEPBIND)
+    try:
+        import OpenEXR
+    finally:
+        sys.setdlopenflags(flags)
+    return OpenEXR
+
+
+def _open(path: Path, header_only: bool) -> Any:
+    _check_complete(path)
+    try:
+        file = _openexr().File(str(path), separate_channels=True, header_only=header_only)
+    except Exception as e:  # the wheel raises plain RuntimeErrors of many wordings
+        raise ExrError(f"{path} cannot be read ({e}): it is truncated or no EXR file") from e
+    return file
+
+
+def _check_complete(path: Path) -> None:
+    """Raise ExrError unless every chunk that the file's own table names is there.
+
+    The library reads what is left of a truncated file and fills the rest; here the light would
+    be wrong without a word. Layout: magic, version, headers, table of chunk offsets, chunks.
+    """
+    truncated = ExrError(f"{path} is truncated or damaged: make it again")
+    if not path.is_file():
+        raise ExrError(f"there is no file {path}: it was moved or deleted; make it again")
+    size = path.stat().st_size
+    with path.open("rb") as f:
+        start = f.read(8)
+        if len(start) < 8 or start[:4] != b"\x76\x2f\x31\x01":
+            raise ExrError(f"{path} is no EXR file (or an empty one): make it again")
+        multipart = bool(start[5] & 0x10)
+
+        def text() -> bytes:
+            out = b""
+            while (c := f.read(1)) != b"\0":
+                if not c or len(out) > 255:
+                    raise truncated
+                out += c
+            return out
+
+        while True:  # headers
+            empty = True
+            while text():
+                empty = False
+                text()  # the attribute's type
+                length = f.read(4)
+                if len(length) < 4:
+                    raise truncated
+                f.seek(struct.unpack("<I", length)[0], os.SEEK_CUR)
+            if empty or not multipart:
+                break
+        table = f.tell()
+        first = f.read(8)
+        if len(first) < 8 or (end := struct.unpack("<Q", first)[0]) <= table or end > size:
+            raise truncated
+        f.seek(table)
+        offsets = np.frombuffer(f.read(end - table), "<u8")
+        if offsets.size == 0 or offsets.min() < end or offsets.max() + 8 > size:
+            raise truncated
+        f.seek(int(offsets.max()))
+        leader = f.read(12 if multipart else 8)
+        if len(leader) < 8 or f.tell() + struct.unpack("<I", leader[-4:])[0] > size:
+            raise truncated
+
+
+def part_names(path: Path) -> list[str]:
+    """The names of the parts of a file, without reading pixels (an unnamed part is '')."""
+    return [str(p.header.get("name", "")) for p in _open(path, header_only=True).parts]
+
+
+def header(path: Path) -> dict[str, Any]:
+    """The header of the first part."""
+    return dict(_open(path, header_only=True).parts[0].header)
+
+
+def read(path: Path) -> dict[str, NDArray]:
+    """All parts of a file: part name -> (H, W, C), C as R, G, B(, A), or one channel.
+
+    A part's name loses nothing; channel names lose their prefix. Raises ExrError for a file that
+    is missing, truncated, or has parts of odd channels.
+    """
+    file = _open(path, header_only=False)
+    out: dict[str, NDArray] = {}
+    for part in file.parts:
+        channels = {str(name).rsplit(".", 1)[-1]: ch.pixels for name, ch in part.channels.items()}
+        order = _RGB.get(tuple(sorted(channels)), "".join(sorted(channels)))
+        if any(pixels is None for pixels in channels.values()):
+            raise ExrError(f"{path} has no pixels in part '{part.header.get('name')}'")
+        if len(channels) == 1:
+            pixels = next(iter(channels.values()))[..., None]
+        elif set(order) == set(channels):
+            pixels = np.stack([channels[c] for c in order], axis=-1)
+        else:
+            raise ExrError(f"{path} has channels {sorted(channels)}: expected R, G, B or one")
+        out[str(part.header.get("name", ""))] = pixels
+    return out
+
+
+def write(
+    path: Path,
+    layers: dict[str, NDArray],
+    attributes: dict[str, Any] | None = None,
+    colour_space: str = "Linear Rec.709",
+) -> None:
+    """Write layers, (H, W, 3), (H, W, 4) or (H, W), each as a part of its own; ZIP, as they are.
+
+    A single layer named '' makes an ordinary one-part image. The file appears whole or not at
+    all. Raises ExrError if the folder cannot be written or the disk is full.
+    """
+    exr = _openexr()
+    parts = []
+    for name, pixels in layers.items():
+        pixels = np.asarray(pixels)
+        if pixels.dtype != np.float16:
+            pixels = pixels.astype(np.float32, copy=False)
+        planes = pixels[..., None] if pixels.ndim == 2 else pixels
+        names = {1: "Y", 3: "RGB", 4: "RGBA"}[planes.shape[-1]]
+        channels = {c: np.ascontiguousarray(planes[..., i]) for i, c in enumerate(names)}
+        head = {"compression": exr.ZIP_COMPRESSION, "type": exr.scanlineimage}
+        if colour_space in COLOUR_SPACES:
+            head["colorInteropID"] = COLOUR_SPACES[colour_space]
+        head["colorSpace"] = colour_space
+        parts.append(exr.Part({**head, **(attributes or {})}, channels, name))
+    partial = path.with_name(path.name + ".part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        exr.File(parts).write(str(partial))
+        partial.replace(path)
+    except (OSError, RuntimeError) as e:
+        partial.unlink(missing_ok=True)
+        raise ExrError(
+            f"{path} cannot be written ({e}): make room on the disk, or choose a folder that "
+            "can be written"
+        ) from e

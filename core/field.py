@@ -1,0 +1,293 @@
+"""The reflectance field on disk: for every pixel and patch a coefficient and a support (paper 5).
+
+A folder: `field.json` says in words what it holds, and each tile is a folder of .npy arrays that
+are mapped, not read, until they are used. docs/field-format.md says enough to write a reader.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import FieldError
+from .hemicube import Hemicube
+from .supports import BY_CODE, NOTHING, Support
+
+VERSION = 1
+HEADER = "field.json"
+LAYERS = ("own", "alpha", "albedo", "normal", "depth")
+
+
+@dataclass(frozen=True)
+class Region:
+    """A rectangle of pixels; rows count from the top."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+
+    @property
+    def pixels(self) -> int:
+        return self.width * self.height
+
+    @property
+    def slices(self) -> tuple[slice, slice]:
+        return slice(self.y, self.y + self.height), slice(self.x, self.x + self.width)
+
+
+@dataclass(frozen=True)
+class Entries:
+    """The entries of one patch that share a support model.
+
+    pixels: (n,) indices into the tile, row by row; coefficient: (n, 3) R; parameters: (n, p).
+    """
+
+    support: Support
+    pixels: NDArray[np.intp]
+    coefficient: NDArray[np.float32]
+    parameters: NDArray[np.float32]
+
+
+class TileWriter:
+    """Collects one tile's entries, patch after patch, and writes them at the end."""
+
+    def __init__(self, region: Region, layers: dict[str, NDArray]) -> None:
+        self.region = region
+        self.layers = layers
+        self.codes: list[NDArray] = []
+        self.scales: list[float] = []
+        self.parts: dict[int, tuple[list[NDArray], list[NDArray]]] = {}
+
+    def add(self, codes: NDArray, coefficient: NDArray, parameters: dict[int, NDArray]) -> None:
+        """The next patch: model code (n,), R (n, 3), and each used code's parameters (m, p)."""
+        # half floats are relative to the patch's brightest, so that any exposure fits them
+        scale = float(coefficient.max(initial=0)) or 1.0
+        self.codes.append(codes)
+        self.scales.append(scale)
+        for code, values in parameters.items():
+            r, p = self.parts.setdefault(code, ([], []))
+            r.append((coefficient[codes == code] / scale).astype(np.float16))
+            p.append(np.rint(np.clip(values, 0, 1) * 65535).astype(np.uint16))
+
+    def write(self, folder: Path) -> dict[str, int]:
+        """Write the arrays; returns how many entries each model took."""
+        folder.mkdir(parents=True)
+        codes = np.stack(self.codes)
+        np.save(folder / "codes.npy", codes)
+        np.save(folder / "scales.npy", np.array(self.scales, np.float32))
+        used = {}
+        for code, (r, p) in sorted(self.parts.items()):
+            name = BY_CODE[code].name
+            np.save(folder / f"{name}_coefficient.npy", np.concatenate(r))
+            np.save(folder / f"{name}_parameters.npy", np.concatenate(p))
+            used[name] = sum(map(len, r))
+        for name, pixels in self.layers.items():
+            dtype = np.float32 if name in ("own", "depth") else np.float16
+            np.save(folder / f"{name}.npy", pixels.astype(dtype))
+        return used
+
+
+class FieldWriter:
+    """Writes a field tile by tile. It is there only once `close` has returned."""
+
+    def __init__(self, folder: Path, hemicube: Hemicube, shape: tuple[int, int], **about: Any):
+        self.folder = folder
+        self.partial = folder.with_name(folder.name + ".part")
+        self.head: dict[str, Any] = {
+            "format": "ARTO reflectance field",
+            "version": VERSION,
+            "height": shape[0],
+            "width": shape[1],
+            "hemicube": hemicube.to_json(),
+            "patches": len(hemicube),
+            "about": about,
+            "tiles": [],
+        }
+        with _writing(folder):
+            shutil.rmtree(self.partial, ignore_errors=True)
+            self.partial.mkdir(parents=True)
+
+    def add(self, tile: TileWriter) -> None:
+        name = f"tile_{len(self.head['tiles']):04d}"
+        r = tile.region
+        with _writing(self.folder):
+            used = tile.write(self.partial / name)
+        self.head["tiles"].append(
+            {"folder": name, "region": [r.x, r.y, r.width, r.height], "entries": used}
+        )
+
+    def close(self) -> None:
+        with _writing(self.folder):
+            (self.partial / HEADER).write_text(json.dumps(self.head, indent=1))
+            old = self.folder.with_name(self.folder.name + ".old")
+            shutil.rmtree(old, ignore_errors=True)
+            if self.folder.exists():
+                self.folder.rename(old)
+            self.partial.rename(self.folder)
+            shutil.rmtree(old, ignore_errors=True)
+
+    def abandon(self) -> None:
+        """Remove what was written; a field that was there before stays."""
+        shutil.rmtree(self.partial, ignore_errors=True)
+
+
+class _writing:
+    """Turns a failing write into a FieldError that says what to do."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, OSError):
+            raise FieldError(
+                f"the field {self.folder} cannot be written ({error}): make room on the disk, "
+                "or choose a folder that can be written"
+            ) from error
+
+
+class Tile:
+    """One tile of an opened field; arrays stay on disk until asked for."""
+
+    def __init__(self, folder: Path, entry: dict[str, Any], patches: int) -> None:
+        self.folder = folder / entry["folder"]
+        self.region = Region(*entry["region"])
+        self.used: dict[str, int] = entry["entries"]
+        self.patches = patches
+
+    def _load(self, name: str, shape: tuple[int, ...] | None = None) -> NDArray:
+        path = self.folder / f"{name}.npy"
+        try:
+            out = np.load(path, mmap_mode="r")
+        except (OSError, ValueError) as e:
+            raise FieldError(f"{path} is missing or damaged ({e}): fit again") from e
+        if shape is not None and out.shape != shape:
+            raise FieldError(f"{path} has the shape {out.shape}, not {shape}: fit again")
+        return out
+
+    @cached_property
+    def codes(self) -> NDArray[np.uint8]:
+        """(K, n): which model each entry has, 0 for none."""
+        return self._load("codes", (self.patches, self.region.pixels))
+
+    def layer(self, name: str) -> NDArray[np.float32]:
+        """One of `LAYERS`, (h, w, ...), float32."""
+        out = self._load(name)
+        if out.shape[:2] != (self.region.height, self.region.width):
+            raise FieldError(f"{self.folder / name}.npy has the wrong size: fit again")
+        return out.astype(np.float32)
+
+    def has_layer(self, name: str) -> bool:
+        return (self.folder / f"{name}.npy").is_file()
+
+    def entries(self) -> Iterator[tuple[int, list[Entries]]]:
+        """Every patch with its entries, model by model."""
+        arrays, scales = {}, self._load("scales", (self.patches,))
+        for name, count in self.used.items():
+            support = next((s for s in BY_CODE.values() if s.name == name), None)
+            if support is None:
+                raise FieldError(
+                    f"{self.folder} uses the support model '{name}', which this version does "
+                    "not know: update ARTO, or fit again"
+                )
+            arrays[support.code] = (
+                self._load(f"{name}_coefficient", (count, 3)),
+                self._load(f"{name}_parameters", (count, len(support.parameters))),
+            )
+        at = dict.fromkeys(arrays, 0)
+        for k in range(self.patches):
+            codes = np.asarray(self.codes[k])
+            found = []
+            for code, (coefficient, parameters) in arrays.items():
+                pixels = np.flatnonzero(codes == code)
+                if not len(pixels):
+                    continue
+                rows = slice(at[code], at[code] + len(pixels))
+                at[code] += len(pixels)
+                found.append(
+                    Entries(
+                        BY_CODE[code],
+                        pixels,
+                        coefficient[rows].astype(np.float32) * scales[k],
+                        parameters[rows].astype(np.float32) / np.float32(65535),
+                    )
+                )
+            yield k, found
+
+
+class Field:
+    """A reflectance field, opened: the header is read, the arrays are not.
+
+    Raises FieldError if it is missing, damaged, or of another version.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        path = folder / HEADER
+        if not path.is_file():
+            raise FieldError(f"there is no reflectance field in {folder}: run Fit first")
+        try:
+            self.head: dict[str, Any] = json.loads(path.read_text())
+        except (OSError, ValueError) as e:
+            raise FieldError(f"{path} cannot be read ({e}): fit again") from e
+        version = self.head.get("version")
+        if version != VERSION:
+            raise FieldError(
+                f"{folder} is a field of version {version}; this ARTO reads version {VERSION}: "
+                "fit again from the capture set"
+            )
+        try:
+            self.hemicube = Hemicube.from_json(self.head["hemicube"])
+            self.shape = (int(self.head["height"]), int(self.head["width"]))
+            self.tiles = [Tile(folder, t, len(self.hemicube)) for t in self.head["tiles"]]
+        except (KeyError, TypeError, ValueError) as e:
+            raise FieldError(f"{path} lacks {e}: fit again") from e
+
+    @property
+    def about(self) -> dict[str, Any]:
+        return self.head.get("about", {})
+
+    def shares(self) -> dict[str, float]:
+        """Which share of all pixel-patch pairs each model took, 'nothing' included."""
+        total = sum(t.region.pixels for t in self.tiles) * len(self.hemicube)
+        out: dict[str, float] = {}
+        for tile in self.tiles:
+            for name, count in tile.used.items():
+                out[name] = out.get(name, 0) + count / total
+        out["nothing"] = 1 - sum(out.values())
+        return out
+
+    def bytes_per_pixel(self) -> float:
+        """What relighting reads: coefficients, supports and codes, on disk."""
+        names = [f"{n}_{w}" for n in self.shares() for w in ("coefficient", "parameters")]
+        files = [
+            t.folder / f"{name}.npy" for t in self.tiles for name in [*names, "codes", "scales"]
+        ]
+        size = sum(f.stat().st_size for f in files if f.is_file())
+        return size / sum(t.region.pixels for t in self.tiles)
+
+    def layer(self, name: str) -> NDArray[np.float32]:
+        """A layer of the whole picture, zero outside the tiles -> (H, W) or (H, W, 3)."""
+        out: NDArray[np.float32] | None = None
+        for tile in self.tiles:
+            part = tile.layer(name)
+            if out is None:
+                out = np.zeros((*self.shape, *part.shape[2:]), np.float32)
+            out[tile.region.slices] = part
+        if out is None:
+            raise FieldError(f"{self.folder} holds no tiles: fit again")
+        return out
+
+
+__all__ = ["LAYERS", "NOTHING", "Entries", "Field", "FieldWriter", "Region", "Tile", "TileWriter"]

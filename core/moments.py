@@ -1,0 +1,72 @@
+"""Moments: what the basis images of one patch say about how its light reaches the pixels.
+
+For the transport T(u, v) from a patch to a pixel, moment m is the integral of T times the m-th of
+`patterns.MONOMIALS`. The zeroth is the reflection coefficient R (paper 3); the others over it are
+the mean place on the patch that the pixel sees, and its spread.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .patterns import ONE, UU, UV, VV, PatternSet, U, V
+
+UNIFORM_VARIANCE = 1 / 12
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Moments of n pixels for one patch.
+
+    coefficient: (n, 3) reflection coefficient R per channel. normalised: (6, n) moments shared by
+    the channels, over the zeroth; NaN where the patterns cannot tell. A pixel without light from
+    the patch has those of the whole patch.
+    """
+
+    coefficient: NDArray
+    normalised: NDArray
+
+    @staticmethod
+    def from_basis(basis: NDArray, patterns: PatternSet) -> Moments:
+        """basis: (P, n, 3) -> the moments. The channels share a support, as in the paper (5)."""
+        # float64: a narrow support is a small difference of large moments
+        shared = patterns.moments(basis.sum(axis=-1, dtype=np.float64))
+        return Moments(patterns.coefficient(basis), normalise(shared))
+
+    @cached_property
+    def mean(self) -> tuple[NDArray, NDArray]:
+        """Centre of the light's origin on the patch, (u, v), each (n,)."""
+        return self.normalised[U], self.normalised[V]
+
+    @cached_property
+    def variance(self) -> tuple[NDArray, NDArray]:
+        """Variances along u and v, each (n,), not below 0."""
+        mu, mv = self.mean
+        return (
+            np.maximum(self.normalised[UU] - mu * mu, 0),
+            np.maximum(self.normalised[VV] - mv * mv, 0),
+        )
+
+    @cached_property
+    def covariance(self) -> NDArray:
+        """Covariance of u and v, (n,)."""
+        mu, mv = self.mean
+        return self.normalised[UV] - mu * mv
+
+
+def normalise(moments: NDArray) -> NDArray:
+    """(6, n) moments over the zeroth, held inside what any transport on [0, 1]^2 can have."""
+    total = moments[ONE]
+    lit = total > 0
+    out = moments / np.where(lit, total, 1)
+    out[:, ~lit] = np.array([1, 1 / 2, 1 / 3, 1 / 2, 1 / 3, 1 / 4])[:, None]
+    out[[U, V]] = np.clip(out[[U, V]], 0, 1)
+    for mean, square in ((U, UU), (V, VV)):
+        # 0 <= u <= 1, so E[u]^2 <= E[u^2] <= E[u]
+        out[square] = np.clip(out[square], out[mean] ** 2, out[mean])
+    out[UV] = np.clip(out[UV], np.maximum(out[U] + out[V] - 1, 0), np.minimum(out[U], out[V]))
+    return out

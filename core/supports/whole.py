@@ -1,0 +1,22 @@
+"""The whole patch: every direction of it counts the same. This is the Light Stage (paper 8)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..light import PatchLight
+from ..moments import Moments
+
+
+class Whole:
+    name = "whole"
+    code = 1
+    parameters: tuple[str, ...] = ()
+    needs: tuple[int, ...] = ()
+
+    def fit(self, moments: Moments) -> NDArray:
+        return np.empty((len(moments.coefficient), 0), np.float32)
+
+    def average(self, light: PatchLight, k: int, parameters: NDArray) -> NDArray:
+        return np.broadcast_to(light.whole[k], (len(parameters), 3))
