@@ -52,7 +52,12 @@ def check_scene(scene: bpy.types.Scene) -> None:
                 "the world has a volume, which would swallow the light of far patches: put the "
                 "fog into an object around the scene instead"
             )
-    catchers = [o.name for o in scene.objects if o.is_shadow_catcher and not o.hide_render]
+    things = list(scene.objects)
+    things += [o for e in things if e.instance_collection for o in e.instance_collection.all_objects]
+    # a lamp's own flag means nothing
+    catchers = [
+        o.name for o in things if o.type != "LIGHT" and o.is_shadow_catcher and not o.hide_render
+    ]
     if catchers:
         raise SceneError(
             f"'{catchers[0]}' is a shadow catcher, which writes no light groups: turn Shadow "

@@ -58,36 +58,34 @@ def node_group(image: bpy.types.Image) -> Any:
 
 
 def wire(scene: bpy.types.Scene, group: Any) -> Any:
-    """Put the node group into the scene's compositor, and return its node.
+    """Put the node group into the scene's compositor, seen through the viewer; return its node.
 
-    An artist's own tree only gains the node; its links are left alone, except that an output that
-    nothing feeds is fed. A scene without a compositor gets one that shows the plate.
+    What the compositor puts out stays what it was: an artist's tree gains the node, and a viewer
+    if it had none; a scene without a compositor gets one that passes its render on.
     """
     tree = scene.compositing_node_group
     if tree is None:
         tree = bpy.data.node_groups.new("ARTO Compositor", "CompositorNodeTree")
         tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+        render = tree.nodes.new("CompositorNodeRLayers")
+        render.scene = scene
+        out = tree.nodes.new("NodeGroupOutput")
+        out.location = (500, 0)
+        tree.links.new(render.outputs["Image"], out.inputs["Image"])
         scene.compositing_node_group = tree
     node = next(
         (n for n in tree.nodes if n.bl_idname == "CompositorNodeGroup" and n.node_tree == group),
         None,
     )
     if node is None:
-        below = min((n.location.y - n.height for n in tree.nodes), default=0.0)
+        below = min((n.location.y - max(n.height, 400) for n in tree.nodes), default=0.0)
         node = tree.nodes.new("CompositorNodeGroup")
         node.node_tree = group
         node.label = GROUP
-        node.location = (0, below - 40 if len(tree.nodes) > 1 else 0)
-    if tree.nodes.active is None:
-        tree.nodes.active = node
-    out = next((n for n in tree.nodes if n.bl_idname == "NodeGroupOutput"), None)
-    if out is None:
-        out = tree.nodes.new("NodeGroupOutput")
-        out.location = (node.location.x + 400, node.location.y)
-    if len(out.inputs) and not any(s.is_linked for s in out.inputs):
-        tree.links.new(node.outputs["Image"], out.inputs[0])
-    if not any(n.bl_idname == "CompositorNodeViewer" for n in tree.nodes):
-        viewer = tree.nodes.new("CompositorNodeViewer")
-        viewer.location = (node.location.x + 400, node.location.y - 150)
-        tree.links.new(node.outputs["Image"], viewer.inputs["Image"])
+        node.width = 200
+        node.location = (0, below - 40)
+        if not any(n.bl_idname == "CompositorNodeViewer" for n in tree.nodes):
+            viewer = tree.nodes.new("CompositorNodeViewer")
+            viewer.location = (node.location.x + 500, node.location.y)
+            tree.links.new(node.outputs["Image"], viewer.inputs["Image"])
     return node

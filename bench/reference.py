@@ -16,10 +16,9 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
-
 from arto.arto_addon.stage import float_exr
 from arto.core import exr
+from numpy.typing import NDArray
 
 from . import scenes
 
@@ -78,6 +77,7 @@ def render(scene: bpy.types.Scene, samples: int, seed: int, denoise: bool = Fals
     layer = scene.view_layers[0]
     layer.use_pass_object_index = True
     settings.film_transparent = True
+    settings.use_compositing = False
     float_exr(settings)
     path = Path(bpy.app.tempdir) / "reference.exr"
     settings.filepath, settings.use_file_extension = str(path), False

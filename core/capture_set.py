@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import exr
-from .errors import CaptureSetError, ExrError
+from .errors import ArtoError, CaptureSetError, ExrError
 from .field import Region
 from .hemicube import Hemicube
 from .patterns import PatternSet, pattern_set
@@ -82,6 +82,8 @@ class CaptureSet:
             done = [bool(t["done"]) for t in self.head["tiles"]]
         except (KeyError, TypeError, ValueError) as e:
             raise CaptureSetError(f"{path} lacks {e}: capture again") from e
+        except ArtoError as e:
+            raise CaptureSetError(f"{path} is damaged ({e}): capture again") from e
         if not unfinished and not all(done):
             raise CaptureSetError(
                 f"{folder} is unfinished ({sum(done)} of {len(done)} tiles): run Capture again, "
@@ -131,7 +133,9 @@ class CaptureSet:
                 else:
                     for guide, ending in GUIDES.items():
                         if part == ending or part.endswith("." + ending):
-                            guides.setdefault(guide, np.squeeze(pixels))
+                            guides.setdefault(
+                                guide, pixels[..., 0] if pixels.shape[-1] == 1 else pixels
+                            )
             if combined is None:
                 raise CaptureSetError(f"{path} has no part 'Combined': capture again")
             if own is None:

@@ -57,6 +57,14 @@ class Environment:
         edges = np.cos(np.linspace(0, np.pi, height + 1))
         return (edges[:-1] - edges[1:]) * (2 * np.pi / width)
 
+    def at(self, directions: NDArray) -> NDArray[np.float32]:
+        """(..., 3) directions, any length -> (..., 3) radiance of the texels that they meet."""
+        height, width = self.image.shape[:2]
+        x, y, z = np.moveaxis(directions, -1, 0)
+        column = np.floor((0.5 - np.arctan2(y, x) / (2 * np.pi)) * width).astype(np.intp) % width
+        row = np.floor((0.5 - np.arctan2(z, np.hypot(x, y)) / np.pi) * height).astype(np.intp)
+        return self.image[np.minimum(row, height - 1), column]
+
     def irradiance(self) -> NDArray[np.float64]:
         """(3,): radiance integrated over all directions."""
         rows = self.image.sum(axis=1, dtype=np.float64)
@@ -66,7 +74,7 @@ class Environment:
 def sample_directions(height: int, width: int, finer: int) -> tuple[NDArray, NDArray, NDArray]:
     """Directions of a grid `finer` times as fine as a map of height x width.
 
-    -> azimuth unit vectors (W * finer, 2), heights z (H * finer,), solid angle of one sample of
+    -> azimuth unit vectors (W * finer, 2), latitudes (H * finer,), solid angle of one sample of
     each row (H * finer,). Separate, because a map is a product of the two.
     """
     rows, columns = height * finer, width * finer

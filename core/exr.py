@@ -7,6 +7,7 @@ compressed reads then report errors for good pixels. Loading the wheel with its 
 
 from __future__ import annotations
 
+import contextlib
 import os
 import struct
 import sys
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from .errors import ExrError
 
-_RGB = {("B", "G", "R"): "RGB", ("A", "B", "G", "R"): "RGBA", ("X", "Y", "Z"): "XYZ"}
+_ORDER = "RGBAXYZ"  # of channels in an array; others follow
 # What a colour space is called in an EXR header (colorInteropID), by Blender's name for it.
 COLOUR_SPACES = {
     "Linear Rec.709": "lin_rec709_scene",
@@ -42,16 +43,19 @@ def _openexr() -> Any:
 
 
 def _open(path: Path, header_only: bool) -> Any:
-    _check_complete(path)
+    parts = _check_complete(path)
     try:
         file = _openexr().File(str(path), separate_channels=True, header_only=header_only)
     except Exception as e:  # the wheel raises plain RuntimeErrors of many wordings
         raise ExrError(f"{path} cannot be read ({e}): it is truncated or no EXR file") from e
+    # the library leaves out a part that it cannot decode, with a warning
+    if len(file.parts) != parts:
+        raise ExrError(f"{path} has a damaged part: make it again")
     return file
 
 
-def _check_complete(path: Path) -> None:
-    """Raise ExrError unless every chunk that the file's own table names is there.
+def _check_complete(path: Path) -> int:
+    """How many parts the file has; ExrError unless every chunk that its own table names is there.
 
     The library reads what is left of a truncated file and fills the rest; here the light would
     be wrong without a word. Layout: magic, version, headers, table of chunk offsets, chunks.
@@ -74,6 +78,7 @@ def _check_complete(path: Path) -> None:
                 out += c
             return out
 
+        parts = 0
         while True:  # headers
             empty = True
             while text():
@@ -83,20 +88,23 @@ def _check_complete(path: Path) -> None:
                 if len(length) < 4:
                     raise truncated
                 f.seek(struct.unpack("<I", length)[0], os.SEEK_CUR)
+            parts += not empty
             if empty or not multipart:
                 break
-        table = f.tell()
-        first = f.read(8)
-        if len(first) < 8 or (end := struct.unpack("<Q", first)[0]) <= table or end > size:
+        # the table ends where the first chunk begins, which may be named last
+        end, last = size, 0
+        while (at := f.tell()) < end:
+            entry = f.read(8)
+            if len(entry) < 8 or (offset := struct.unpack("<Q", entry)[0]) <= at:
+                raise truncated
+            end, last = min(end, offset), max(last, offset)
+        if at != end or not last or last + 8 > size:
             raise truncated
-        f.seek(table)
-        offsets = np.frombuffer(f.read(end - table), "<u8")
-        if offsets.size == 0 or offsets.min() < end or offsets.max() + 8 > size:
-            raise truncated
-        f.seek(int(offsets.max()))
+        f.seek(last)
         leader = f.read(12 if multipart else 8)
         if len(leader) < 8 or f.tell() + struct.unpack("<I", leader[-4:])[0] > size:
             raise truncated
+    return parts
 
 
 def part_names(path: Path) -> list[str]:
@@ -119,15 +127,18 @@ def read(path: Path) -> dict[str, NDArray]:
     out: dict[str, NDArray] = {}
     for part in file.parts:
         channels = {str(name).rsplit(".", 1)[-1]: ch.pixels for name, ch in part.channels.items()}
-        order = _RGB.get(tuple(sorted(channels)), "".join(sorted(channels)))
+        order = sorted(channels, key=lambda c: (_ORDER.find(c) if c in _ORDER else len(_ORDER), c))
         if any(pixels is None for pixels in channels.values()):
             raise ExrError(f"{path} has no pixels in part '{part.header.get('name')}'")
         if len(channels) == 1:
             pixels = next(iter(channels.values()))[..., None]
-        elif set(order) == set(channels):
+        elif len(channels) == len(part.channels) and all(len(c) == 1 for c in channels):
             pixels = np.stack([channels[c] for c in order], axis=-1)
         else:
-            raise ExrError(f"{path} has channels {sorted(channels)}: expected R, G, B or one")
+            raise ExrError(
+                f"{path} has channels {sorted(map(str, part.channels))}: expected R, G, B "
+                "or one a part; save its layers as parts, or as files of their own"
+            )
         out[str(part.header.get("name", ""))] = pixels
     return out
 
@@ -161,9 +172,15 @@ def write(
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         exr.File(parts).write(str(partial))
+        # the library says nothing when the last bytes find no room
+        try:
+            _check_complete(partial)
+        except ExrError:
+            raise OSError("it came out incomplete") from None
         partial.replace(path)
     except (OSError, RuntimeError) as e:
-        partial.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            partial.unlink()
         raise ExrError(
             f"{path} cannot be written ({e}): make room on the disk, or choose a folder that "
             "can be written"

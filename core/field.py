@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import FieldError
+from .errors import ArtoError, FieldError
 from .hemicube import Hemicube
 from .supports import BY_CODE, NOTHING, Support
 
@@ -215,6 +215,8 @@ class Tile:
                     continue
                 rows = slice(at[code], at[code] + len(pixels))
                 at[code] += len(pixels)
+                if at[code] > len(coefficient):
+                    raise FieldError(f"{self.folder} is damaged, its counts differ: fit again")
                 found.append(
                     Entries(
                         BY_CODE[code],
@@ -239,9 +241,9 @@ class Field:
             raise FieldError(f"there is no reflectance field in {folder}: run Fit first")
         try:
             self.head: dict[str, Any] = json.loads(path.read_text())
-        except (OSError, ValueError) as e:
+            version = self.head["version"]
+        except (OSError, ValueError, KeyError, TypeError) as e:
             raise FieldError(f"{path} cannot be read ({e}): fit again") from e
-        version = self.head.get("version")
         if version != VERSION:
             raise FieldError(
                 f"{folder} is a field of version {version}; this ARTO reads version {VERSION}: "
@@ -253,6 +255,8 @@ class Field:
             self.tiles = [Tile(folder, t, len(self.hemicube)) for t in self.head["tiles"]]
         except (KeyError, TypeError, ValueError) as e:
             raise FieldError(f"{path} lacks {e}: fit again") from e
+        except ArtoError as e:
+            raise FieldError(f"{path} is damaged ({e}): fit again") from e
 
     @property
     def about(self) -> dict[str, Any]:

@@ -63,7 +63,11 @@ class Hemicube:
         if not (math.isfinite(self.size) and self.size > 0):
             raise HemicubeError(f"a hemicube of size {self.size}: choose a size above 0")
         r = np.array(self.orientation, np.float64)
-        if r.shape != (3, 3) or not np.allclose(r @ r.T, np.eye(3), atol=1e-4):
+        if (
+            r.shape != (3, 3)
+            or not np.allclose(r @ r.T, np.eye(3), atol=1e-4)
+            or np.linalg.det(r) < 0
+        ):
             raise HemicubeError("the orientation of the hemicube must be a rotation")
 
     def to_json(self) -> dict[str, Any]:

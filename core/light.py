@@ -33,7 +33,7 @@ def _bins(hemicube: Hemicube, height: int, width: int, resolution: int) -> tuple
     key = (hemicube, height, width, resolution)
     if key in _CACHE:
         return _CACHE[key]
-    # two samples a bin and axis at the least, so that no bin stays empty
+    # two samples a bin and axis on average; a narrow bin may still stay empty
     finer = max(1, int(np.ceil(8 * resolution * hemicube.patches / width)))
     azimuth, latitude, weight = sample_directions(height, width, finer)
     # float64: float32 moves a sample on a patch's border to the other side
@@ -93,10 +93,22 @@ class PatchLight:
             texels = environment.image[..., c]
             samples = np.repeat(np.repeat(texels, finer, axis=0), finer, axis=1).ravel()[lit]
             flat[:, c] = np.bincount(index, samples * solid_angle, size)
+        self._fill_empty(environment)
         self._polynomials: dict[tuple[int, ...], NDArray[np.float64]] = {}
         self.sat = np.zeros((len(hemicube), r + 1, r + 1, 4))
         np.cumsum(self.binned, axis=1, out=self.sat[:, 1:, 1:])
         np.cumsum(self.sat[:, 1:, 1:], axis=2, out=self.sat[:, 1:, 1:])
+
+    def _fill_empty(self, environment: Environment) -> None:
+        """A bin that no sample met takes the texel behind its middle, with next to no weight, so
+        that a thin box that sees it alone finds light there."""
+        for k in np.unique(np.nonzero(self.binned[..., 3] == 0)[0]):
+            j, i = np.nonzero(self.binned[k, ..., 3] == 0)
+            u, v = self.bin_centres(k)
+            solid_angle = 1e-3 * self.hemicube.solid_angles[k] / self.resolution**2
+            light = environment.at(self.hemicube.directions(k, u[i], v[j]))
+            self.binned[k, j, i, :3] = light * solid_angle
+            self.binned[k, j, i, 3] = solid_angle
 
     @cached_property
     def whole(self) -> NDArray[np.float64]:

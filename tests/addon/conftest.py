@@ -1,0 +1,39 @@
+"""What the tests in Blender as a module share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import arto
+import bpy
+import pytest
+from scene_tools import captured, small_scene
+
+
+@pytest.fixture(scope="session", autouse=True)
+def registered() -> Iterator[None]:
+    arto.register()
+    yield
+    arto.unregister()
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> bpy.types.Scene:
+    return small_scene(tmp_path)
+
+
+@pytest.fixture(scope="session")
+def noise(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Any]:
+    """Basis images of the small scene by route and seed, each captured once a session."""
+    kept: dict[tuple[str, int], Any] = {}
+
+    def get(route: str, seed: int) -> Any:
+        if (route, seed) not in kept:
+            made = small_scene(tmp_path_factory.mktemp("route"))
+            made.arto.route, made.arto.seed = route, seed
+            kept[route, seed] = captured(made).read(0)
+        return kept[route, seed]
+
+    return get

@@ -1,0 +1,266 @@
+"""The physics of capturing: the routes agree, the light adds up, the scene is as before."""
+
+from __future__ import annotations
+
+import json
+import stat
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from arto.arto_addon import capture, paths, work
+from arto.core import exr
+from arto.core.capture_set import GROUP, CaptureSet
+from arto.core.errors import ArtoError, CancelledError, CaptureSetError, SceneError
+from scene_tools import HEIGHT, WIDTH, captured, cycles, differences, small_scene, snapshot
+
+
+@pytest.mark.parametrize("route", ["pattern", "single"])
+def test_routes_agree(noise, route):
+    """Two routes differ by as much as two seeds of one route do: pixel by pixel in the square, and
+    not at all in the mean (4 standard errors of the difference of seeds)."""
+    one, two, other = noise("all", 1), noise("all", 2), noise(route, 3)
+    seeds = (one.basis - two.basis).astype(np.float64)
+    routes = (other.basis - one.basis).astype(np.float64)
+    for k in range(len(one.basis)):
+        for p in range(one.basis.shape[1]):
+            if one.basis[k, p].max() < 1e-3:
+                assert other.basis[k, p].max() < 0.05
+                continue
+            ratio = np.square(routes[k, p]).mean() / np.square(seeds[k, p]).mean()
+            assert 0.5 < ratio < 2, (k, p, ratio)
+            error = seeds[k, p].std() / np.sqrt(seeds[k, p].size / 3)
+            assert abs(routes[k, p].mean()) < 4 * error, (k, p)
+
+
+def test_light_adds_up(tmp_path):
+    """Combined is the sum of all groups, to float precision, where nothing else gives light."""
+    scene = small_scene(tmp_path)
+    there = captured(scene)
+    parts = exr.read(there.folder / there.files[0][0])
+    combined = next(v for k, v in parts.items() if k.endswith(".Combined"))[..., :3]
+    groups = sum(v.astype(np.float64) for k, v in parts.items() if GROUP.search(k))
+    assert groups.max() > 0.1
+    assert np.abs(combined - groups).max() < 1e-5 * groups.max()
+    data = there.read(0)
+    assert (data.own == 0).all()
+
+
+def test_own_lamps_are_a_layer_of_their_own(tmp_path):
+    """The own layer is what Cycles shows in a black world; the patches do not shade the sun."""
+    scene = small_scene(tmp_path, lamp=True)
+    scene.arto.samples = 256
+    own = captured(scene).read(0).own
+    scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0
+    one, two = (cycles(scene, 256, seed, tmp_path)[..., :3] for seed in (1, 2))
+    noise = np.square(one - two).mean()
+    assert own.mean() > 0.05
+    assert np.square(own - one).mean() < 2 * noise + 1e-6
+    assert abs(own.mean() / one.mean() - 1) < 0.01
+
+
+def test_guides_and_description(tmp_path):
+    scene = small_scene(tmp_path)
+    there = captured(scene)
+    data = there.read(0)
+    assert set(data.guides) == {"albedo", "normal", "depth"}
+    assert data.guides["albedo"].shape == (HEIGHT, WIDTH, 3)
+    assert data.alpha.min() + 1e-6 > 0 and data.alpha.max() == 1
+    assert there.head["changed"]["cycles.sample_clamp_indirect"] == [10.0, 0.0]
+    assert there.head["colour_space"] == "Linear Rec.709"
+    assert there.head["blender"] == bpy.app.version_string
+
+
+def test_tiles_make_the_same_picture(tmp_path):
+    """A picture in tiles is that picture, in the right place: rows are not lost or doubled."""
+    scene = small_scene(tmp_path)
+    whole = captured(scene).read(0)
+    # 38 passes of 24 bytes and 24 pixels a row: 16 MB hold it all, so ask for strips directly
+    region = capture.picture_region(scene)
+    strips = capture.tiles_of(region, 30, 16)
+    assert strips == [region]
+    budget = capture.tiles_of
+    try:
+        capture.tiles_of = lambda r, n, m: [
+            type(r)(r.x, r.y, r.width, 7),
+            type(r)(r.x, r.y + 7, r.width, r.height - 7),
+        ]
+        tiled = captured(scene)
+    finally:
+        capture.tiles_of = budget
+    parts = [tiled.read(i) for i in range(2)]
+    albedo = np.concatenate([p.guides["albedo"] for p in parts])
+    # edges of things sit in the same rows; the noise differs
+    assert np.abs(albedo - whole.guides["albedo"]).mean() < 0.01
+    together = np.concatenate([p.basis for p in parts], axis=2)
+    assert abs(together.mean() / whole.basis.mean() - 1) < 0.03
+
+
+def test_tiles_fit_the_budget(scene):
+    region = capture.picture_region(scene)
+    row = region.width * (480 + capture.OTHER_PASSES) * capture.BYTES_PER_PASS
+    scene_rows = capture.tiles_of(type(region)(0, 0, 2000, 1000), 480, 256)
+    assert sum(t.height for t in scene_rows) == 1000
+    assert all(t.height * 2000 * 488 * 24 <= 256 * 2**20 for t in scene_rows)
+    assert row > 0
+    with pytest.raises(SceneError, match="memory budget"):
+        capture.tiles_of(type(region)(0, 0, 100000, 10), 9000, 16)
+
+
+def test_render_region(tmp_path):
+    """With a render region only that region is captured, and it is the right one."""
+    scene = small_scene(tmp_path)
+    whole = captured(scene).read(0)
+    r = scene.render
+    r.use_border = True
+    r.border_min_x, r.border_max_x, r.border_min_y, r.border_max_y = 0.25, 0.75, 0.0, 0.5
+    part = captured(scene).read(0)
+    y, x = part.region.slices
+    assert (part.region.width, part.region.height) == (12, 9)
+    assert part.region.y == 9
+    assert np.abs(part.guides["albedo"] - whole.guides["albedo"][y, x]).mean() < 0.01
+
+
+def _interrupt_after(steps, renders):
+    """Drive the work and stop it as ESC does, in the middle of the given render."""
+    done = 0
+    for step in steps:
+        if isinstance(step, work.Render):
+            if done == renders:
+                step.state = "cancelled"
+                continue
+            work.blocking_render(step)
+            done += 1
+
+
+def test_cancelled_scene_is_as_before_and_goes_on(tmp_path, monkeypatch):
+    scene = small_scene(tmp_path)
+    monkeypatch.setattr(
+        capture, "tiles_of", lambda r, n, m: [type(r)(0, y, r.width, 6) for y in (0, 6, 12)]
+    )
+    before = snapshot()
+    with pytest.raises(CancelledError, match="run it again"):
+        _interrupt_after(capture.capture(scene, "ViewLayer"), 2)
+    assert not differences(before, snapshot())
+    folder = paths.capture_folder(scene)
+    head = json.loads((folder / "capture.json").read_text())
+    assert [t["done"] for t in head["tiles"]] == [True, True, False]
+    with pytest.raises(CaptureSetError, match="2 of 3 tiles"):
+        CaptureSet(folder)
+    kept = (folder / "tile_0001.exr").stat().st_mtime_ns
+    there = captured(scene)
+    assert (folder / "tile_0001.exr").stat().st_mtime_ns == kept
+    assert len([there.read(i) for i in range(3)]) == 3
+    assert not differences(before, snapshot())
+
+
+def test_another_capture_does_not_go_on_with_it(tmp_path, monkeypatch):
+    scene = small_scene(tmp_path)
+    monkeypatch.setattr(
+        capture, "tiles_of", lambda r, n, m: [type(r)(0, y, r.width, 9) for y in (0, 9)]
+    )
+    with pytest.raises(CancelledError):
+        _interrupt_after(capture.capture(scene, "ViewLayer"), 1)
+    old = (paths.capture_folder(scene) / "tile_0000.exr").stat().st_mtime_ns
+    scene.arto.samples += 1
+    there = captured(scene)
+    assert (there.folder / "tile_0000.exr").stat().st_mtime_ns != old
+
+
+def test_finished_capture_leaves_the_scene_as_before(tmp_path):
+    scene = small_scene(tmp_path, lamp=True)
+    scene.view_layers.new("Second")
+    scene.view_layers[0].use_pass_mist = True
+    scene.view_layers[0].lightgroups.add(name="key")
+    scene.objects["Sun"].lightgroup = "key"
+    before = snapshot()
+    captured(scene)
+    assert not differences(before, snapshot())
+
+
+def test_failing_render_leaves_the_scene_as_before(tmp_path, monkeypatch):
+    scene = small_scene(tmp_path)
+    before = snapshot()
+
+    def crash(request):
+        raise RuntimeError("out of memory")
+
+    monkeypatch.setattr(work, "blocking_render", crash)
+    with pytest.raises(RuntimeError):
+        work.run(capture.capture(scene, "ViewLayer"))
+    assert not differences(before, snapshot())
+
+
+def test_interrupt_from_the_keyboard(tmp_path, monkeypatch):
+    scene = small_scene(tmp_path)
+    before = snapshot()
+
+    def interrupt(*args, **kwargs):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(work, "blocking_render", interrupt)
+    with pytest.raises(CancelledError):
+        work.run(capture.capture(scene, "ViewLayer"))
+    assert not differences(before, snapshot())
+
+
+def test_bad_scenes(scene):
+    camera, scene.camera = scene.camera, None
+    with pytest.raises(SceneError, match="no camera"):
+        captured(scene)
+    scene.camera = camera
+    scene.render.engine = "BLENDER_EEVEE"
+    with pytest.raises(SceneError, match="Cycles"):
+        captured(scene)
+    scene.render.engine = "CYCLES"
+    scene.objects["Floor"].is_shadow_catcher = True
+    with pytest.raises(SceneError, match="Floor"):
+        captured(scene)
+    scene.objects["Floor"].is_shadow_catcher = False
+    tree = scene.world.node_tree
+    fog = tree.nodes.new("ShaderNodeVolumeScatter")
+    tree.links.new(fog.outputs[0], tree.get_output_node("CYCLES").inputs["Volume"])
+    with pytest.raises(SceneError, match="volume"):
+        captured(scene)
+    tree.nodes.remove(fog)
+    for thing in scene.objects:
+        thing.hide_render = thing.type == "MESH"
+    with pytest.raises(SceneError, match="shows nothing"):
+        captured(scene)
+
+
+def test_never_saved_file(scene):
+    scene.arto.folder = "//arto/"
+    with pytest.raises(SceneError, match="never saved"):
+        captured(scene)
+    with pytest.raises(RuntimeError, match="never saved"):
+        bpy.ops.arto.capture()
+
+
+def test_unwritable_folder(scene, tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("not a folder")
+    before = snapshot()
+    scene.arto.folder = str(blocked)
+    with pytest.raises(ArtoError, match="choose"):
+        captured(scene)
+    scene.arto.folder = str(tmp_path / "arto")
+    assert not differences(before, snapshot())
+
+
+def test_near_hemicube_may_be_chosen(tmp_path):
+    """A near hemicube lights the floor beside a patch more than the one across."""
+    scene = small_scene(tmp_path)
+    scene.arto.far, scene.arto.size = False, 6.0
+    near = captured(scene)
+    assert near.hemicube.size == 6.0
+    assert near.head["hemicube"]["size"] == 6.0
+
+
+def test_files_are_ordinary(tmp_path):
+    scene = small_scene(tmp_path)
+    there = captured(scene)
+    mode = (there.folder / there.files[0][0]).stat().st_mode
+    assert mode & stat.S_IRUSR
+    assert not list(Path(there.folder).glob("*.part"))

@@ -1,0 +1,174 @@
+"""Small scenes for tests in Blender as a module, and ways to look at them."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from arto.arto_addon import capture as capture_module
+from arto.arto_addon import work
+from arto.core.capture_set import CaptureSet
+
+WIDTH, HEIGHT = 24, 18
+
+
+def material(name: str, **inputs: Any) -> bpy.types.Material:
+    out = bpy.data.materials.new(name)
+    shader = out.node_tree.nodes["Principled BSDF"]
+    for key, value in inputs.items():
+        shader.inputs[key.replace("_", " ")].default_value = value
+    return out
+
+
+def add_mesh(scene: bpy.types.Scene, name: str, corners: list, faces: list, mat: Any = None) -> Any:
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(corners, [], faces)
+    if mat:
+        mesh.materials.append(mat)
+    thing = bpy.data.objects.new(name, mesh)
+    scene.collection.objects.link(thing)
+    return thing
+
+
+BOX = (
+    [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)],
+    [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)],
+)
+
+
+def small_scene(folder: Path, lamp: bool = False) -> bpy.types.Scene:
+    """A diffuse floor, a diffuse and a half-glossy box; far too small to be pretty."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT
+    scene.render.resolution_percentage = 100
+    floor = [(-4, -4, 0), (4, -4, 0), (4, 4, 0), (-4, 4, 0)]
+    add_mesh(scene, "Floor", floor, [(0, 1, 2, 3)], material("Floor", Roughness=1.0))
+    add_mesh(scene, "Matt", *BOX, material("Matt", Base_Color=(0.8, 0.3, 0.1, 1), Roughness=1.0))
+    scene.objects["Matt"].location = (-1.3, 0, 1)
+    add_mesh(scene, "Glossy", *BOX, material("Glossy", Metallic=1.0, Roughness=0.3))
+    scene.objects["Glossy"].location = (1.3, 0.3, 1)
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(camera)
+    camera.location, camera.rotation_euler = (0, -9, 4), (math.radians(70), 0, 0)
+    scene.camera = camera
+    scene.world = bpy.data.worlds.new("World")
+    if lamp:
+        light = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+        light.data.energy = 2.0
+        light.rotation_euler = (0.6, 0.3, 0)
+        scene.collection.objects.link(light)
+    settings = scene.arto
+    settings.folder = str(folder / "arto")
+    settings.output = str(folder / "relit.exr")
+    settings.samples, settings.patches = 64, 1
+    return scene
+
+
+def set_colour(scene: bpy.types.Scene, colour: tuple[float, float, float], strength: float = 1.0):
+    background = scene.world.node_tree.nodes["Background"]
+    background.inputs["Color"].default_value = (*colour, 1)
+    background.inputs["Strength"].default_value = strength
+
+
+def captured(scene: bpy.types.Scene) -> CaptureSet:
+    """Capture the scene as a batch run does."""
+    return CaptureSet(work.run(capture_module.capture(scene, scene.view_layers[0].name)))
+
+
+def cycles(scene: bpy.types.Scene, samples: int, seed: int, folder: Path) -> np.ndarray:
+    """What Cycles renders of the scene itself -> (H, W, 4), top-down."""
+    from arto.arto_addon.stage import float_exr, stage
+    from arto.core import exr
+
+    with stage(scene, scene.view_layers[0].name) as on:
+        float_exr(on.scene.render, multilayer=False)
+        settings = on.scene.cycles
+        settings.samples, settings.seed = samples, seed
+        settings.use_adaptive_sampling = settings.use_denoising = False
+        settings.sample_clamp_indirect = 0
+        on.scene.render.film_transparent = True
+        on.scene.render.filepath = str(folder / "cycles.exr")
+        request = work.Render(on.scene.name, 0, "")
+        work.blocking_render(request)
+        request.check()
+    return next(iter(exr.read(folder / "cycles.exr").values()))
+
+
+_SKIP = {"rna_type", "original", "session_uid", "users", "tag", "is_evaluated", "bl_rna"}
+
+
+def snapshot(value: Any = None, depth: int = 0, seen: frozenset[int] = frozenset()) -> Any:
+    """Every property of the file's scenes, worlds, collections, objects, cameras, materials and
+    node trees, as plain values to be compared."""
+    if value is None:
+        # what Blender works out lazily (matrices, bounds, normals) is worked out on both sides
+        bpy.context.view_layer.update()
+        kinds = (
+            "scenes",
+            "worlds",
+            "collections",
+            "objects",
+            "cameras",
+            "materials",
+            "meshes",
+            "node_groups",
+            "lights",
+            "images",
+        )
+
+        def look() -> Any:
+            return {
+                kind: {
+                    block.name: snapshot(block)
+                    for block in getattr(bpy.data, kind)
+                    # Blender's own, of whatever was rendered last
+                    if block.name != "Render Result"
+                }
+                for kind in kinds
+            }
+
+        # looking at a mesh's vertices gives it attributes: look once for that
+        look()
+        return look()
+    if isinstance(value, bpy.types.bpy_struct):
+        embedded = isinstance(value, bpy.types.NodeTree) and value.is_embedded_data
+        if depth and isinstance(value, bpy.types.ID) and not embedded:
+            return value.name_full
+        if depth > 8 or value.as_pointer() in seen:
+            return None
+        seen = seen | {value.as_pointer()}
+        out = {}
+        for prop in value.bl_rna.properties:
+            if prop.identifier in _SKIP or prop.identifier in {"depsgraph", "preview"}:
+                continue
+            try:
+                item = getattr(value, prop.identifier)
+            except (AttributeError, RuntimeError):
+                continue
+            out[prop.identifier] = snapshot(item, depth + 1, seen) if item is not None else None
+        return out
+    if isinstance(value, bpy.types.bpy_prop_collection):
+        return [snapshot(item, depth + 1, seen) for item in value if item is not None]
+    if isinstance(value, (str, int, float, bool, bytes)):
+        return value
+    if isinstance(value, (set, frozenset)):
+        return sorted(map(str, value))
+    try:
+        return [snapshot(item, depth + 1, seen) for item in value]
+    except TypeError:
+        return repr(type(value))
+
+
+def differences(before: Any, after: Any, path: str = "") -> list[str]:
+    """Where two snapshots differ, in words."""
+    if isinstance(before, dict) and isinstance(after, dict):
+        keys = sorted(before.keys() | after.keys())
+        return [
+            d for key in keys for d in differences(before.get(key), after.get(key), f"{path}.{key}")
+        ]
+    return [] if before == after else [f"{path}: {before!s:.80} -> {after!s:.80}"]
