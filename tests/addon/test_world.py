@@ -1,0 +1,165 @@
+"""Worlds brought to environment maps: directions and energy."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+from arto.arto_addon import world
+from arto.core.errors import SceneError
+from scene_tools import set_colour
+
+
+def hdri(scene, pixels, rotation=0.0):
+    """A world with an equirectangular image (rows top-down), turned about the vertical."""
+    height, width = pixels.shape[:2]
+    image = bpy.data.images.new("Sky", width, height, float_buffer=True)
+    image.colorspace_settings.name = "Linear Rec.709"
+    rgba = np.dstack([pixels, np.ones((height, width))]).astype(np.float32)
+    image.pixels.foreach_set(rgba[::-1].ravel())
+    image.pack()
+    tree = scene.world.node_tree
+    texture = tree.nodes.new("ShaderNodeTexEnvironment")
+    texture.image = image
+    mapping = tree.nodes.new("ShaderNodeMapping")
+    mapping.inputs["Rotation"].default_value = (0, 0, rotation)
+    coordinates = tree.nodes.new("ShaderNodeTexCoord")
+    tree.links.new(coordinates.outputs["Generated"], mapping.inputs[0])
+    tree.links.new(mapping.outputs[0], texture.inputs[0])
+    tree.links.new(texture.outputs[0], tree.nodes["Background"].inputs["Color"])
+    return texture
+
+
+def smooth(height=64):
+    v, u = np.mgrid[:height, : 2 * height] / height
+    return np.dstack([1 + np.sin(np.pi * u), v, 0.5 + 0.5 * np.cos(2 * np.pi * u) * v])
+
+
+def test_plain_colour_with_strength(scene):
+    set_colour(scene, (0.2, 0.4, 0.8), strength=3)
+    image = world.bake(scene, 64).image
+    np.testing.assert_allclose(image, np.broadcast_to([0.6, 1.2, 2.4], image.shape), rtol=1e-5)
+
+
+def test_environment_texture_comes_back_texel_by_texel(scene):
+    pixels = smooth()
+    hdri(scene, pixels)
+    image = world.bake(scene, 128).image
+    # all but the seam and the poles, where Cycles interpolates over the rim
+    np.testing.assert_allclose(image[2:-2, 2:-2], pixels[2:-2, 2:-2], atol=0.02)
+
+
+def test_mapping_turns_the_world(scene):
+    pixels = smooth()
+    hdri(scene, pixels, rotation=math.pi / 2)
+    image = world.bake(scene, 128).image
+    turned = np.roll(pixels, 32, axis=1)
+    other = np.roll(pixels, -32, axis=1)
+    error = np.abs(image - turned)[2:-2].mean()
+    assert min(error, np.abs(image - other)[2:-2].mean()) < 0.02
+    assert abs(error - np.abs(image - other)[2:-2].mean()) > 0.1
+
+
+def test_mix_of_worlds_adds_up(scene):
+    tree = scene.world.node_tree
+    set_colour(scene, (1, 0, 0))
+    second = tree.nodes.new("ShaderNodeBackground")
+    second.inputs["Color"].default_value = (0, 2, 0, 1)
+    mix = tree.nodes.new("ShaderNodeMixShader")
+    mix.inputs[0].default_value = 0.25
+    tree.links.new(tree.nodes["Background"].outputs[0], mix.inputs[1])
+    tree.links.new(second.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+    image = world.bake(scene, 64).image
+    np.testing.assert_allclose(image, np.broadcast_to([0.75, 0.5, 0], image.shape), atol=1e-5)
+
+
+@pytest.mark.parametrize("elevation", [60, 15, 3])
+def test_sun_of_half_a_degree_keeps_its_energy(scene, elevation):
+    """A disc of light of half a degree, of known radiance, drawn by nodes: its integral is known
+    in closed form. To 1%."""
+    size, radiance = math.radians(0.53), 1e5
+    e, a = math.radians(elevation), 0.7321
+    direction = (math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e))
+    tree = scene.world.node_tree
+    coordinates = tree.nodes.new("ShaderNodeTexCoord")
+    dot = tree.nodes.new("ShaderNodeVectorMath")
+    dot.operation = "DOT_PRODUCT"
+    dot.inputs[1].default_value = direction
+    tree.links.new(coordinates.outputs["Generated"], dot.inputs[0])
+    inside = tree.nodes.new("ShaderNodeMath")
+    inside.operation = "GREATER_THAN"
+    inside.inputs[1].default_value = math.cos(size / 2)
+    tree.links.new(dot.outputs["Value"], inside.inputs[0])
+    background = tree.nodes["Background"]
+    background.inputs["Color"].default_value = (1, 1, 1, 1)
+    scale = tree.nodes.new("ShaderNodeMath")
+    scale.operation = "MULTIPLY"
+    scale.inputs[1].default_value = radiance
+    tree.links.new(inside.outputs[0], scale.inputs[0])
+    tree.links.new(scale.outputs[0], background.inputs["Strength"])
+    found = world.bake(scene, 1024).irradiance()
+    # float32 cos(size / 2), as the node compares it
+    cosine = float(np.float32(math.cos(size / 2)))
+    expected = radiance * 2 * math.pi * (1 - cosine)
+    np.testing.assert_allclose(found, expected, rtol=0.01)
+
+
+def test_sky_texture_with_its_sun(scene):
+    """The sun of Blender's sky, at two resolutions: the same energy to 1%."""
+    tree = scene.world.node_tree
+    sky = tree.nodes.new("ShaderNodeTexSky")
+    sky.sun_elevation, sky.sun_rotation = math.radians(40), 0.3
+    tree.links.new(sky.outputs[0], tree.nodes["Background"].inputs["Color"])
+    coarse, fine = (world.bake(scene, w).irradiance() for w in (512, 2048))
+    np.testing.assert_allclose(coarse, fine, rtol=0.01)
+    sky.sun_disc = False
+    assert (world.bake(scene, 512).irradiance() < 0.8 * coarse).all()
+
+
+def test_world_that_shows_the_camera_something_else(scene):
+    """The light is what surfaces see; the background is what the camera sees."""
+    tree = scene.world.node_tree
+    set_colour(scene, (0, 1, 0))
+    shown = tree.nodes.new("ShaderNodeBackground")
+    shown.inputs["Color"].default_value = (1, 0, 0, 1)
+    rays = tree.nodes.new("ShaderNodeLightPath")
+    mix = tree.nodes.new("ShaderNodeMixShader")
+    tree.links.new(rays.outputs["Is Camera Ray"], mix.inputs[0])
+    tree.links.new(tree.nodes["Background"].outputs[0], mix.inputs[1])
+    tree.links.new(shown.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+    np.testing.assert_allclose(world.bake(scene, 64).image.mean(axis=(0, 1)), (0, 1, 0), atol=1e-4)
+    np.testing.assert_allclose(world.background(scene).mean(axis=(0, 1)), (1, 0, 0), atol=1e-4)
+
+
+def test_world_hidden_from_the_camera_still_lights(scene):
+    set_colour(scene, (0.5, 0.5, 0.5))
+    scene.world.cycles_visibility.camera = False
+    np.testing.assert_allclose(world.bake(scene, 64).image, 0.5, atol=1e-4)
+    assert world.background(scene).max() == 0
+
+
+def test_no_world_and_missing_image(scene, tmp_path):
+    texture = hdri(scene, smooth(8))
+    missing = bpy.data.images.new("Missing", 4, 4)
+    missing.source, missing.filepath = "FILE", str(tmp_path / "gone.exr")
+    texture.image = missing
+    with pytest.raises(SceneError, match=r"gone\.exr"):
+        world.bake(scene, 64)
+    texture.image = None
+    with pytest.raises(SceneError, match="has no image"):
+        world.bake(scene, 64)
+    scene.world = None
+    with pytest.raises(SceneError, match="no world"):
+        world.bake(scene, 64)
+
+
+def test_nothing_is_left_behind(scene):
+    kinds = ("scenes", "worlds", "objects", "cameras", "meshes", "materials")
+    before = {k: len(getattr(bpy.data, k)) for k in kinds}
+    world.bake(scene, 64)
+    world.background(scene)
+    assert {k: len(getattr(bpy.data, k)) for k in kinds} == before

@@ -1,0 +1,216 @@
+"""What the tests of `core` share: transports whose answer is known, and captures made of them."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from arto.core import capture_set, exr, fit
+from arto.core.environment import Environment
+from arto.core.field import Field, Region
+from arto.core.hemicube import Hemicube
+from arto.core.patterns import PatternSet, pattern_set
+from hypothesis import settings
+from numpy.typing import NDArray
+
+# No clock: the machine may be busy. No random seed of the day: a test is green or red for all.
+settings.register_profile("core", deadline=None, max_examples=40, derandomize=True)
+settings.load_profile("core")
+
+
+def _rotation(seed: int) -> tuple[tuple[float, ...], ...]:
+    q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    q *= np.sign(np.diag(r))
+    if np.linalg.det(q) < 0:
+        q[:, 0] *= -1
+    return tuple(tuple(float(x) for x in row) for row in q)
+
+
+def _planted(patterns: PatternSet, boxes: NDArray, coefficient: NDArray) -> NDArray:
+    """Basis images (P, n, 3) of uniform boxes (n, 4: u0, u1, v0, v1) with R (n, 3): the integral
+    of each pattern's polynomial over the box, written out."""
+    u0, u1, v0, v1 = np.asarray(boxes, np.float64).T
+    moments = np.stack(
+        [
+            np.ones_like(u0),
+            (u0 + u1) / 2,
+            (u0 * u0 + u0 * u1 + u1 * u1) / 3,
+            (v0 + v1) / 2,
+            (v0 * v0 + v0 * v1 + v1 * v1) / 3,
+            (u0 + u1) * (v0 + v1) / 4,
+        ]
+    )
+    return (patterns.matrix @ moments)[..., None] * coefficient
+
+
+def _hits(patterns: PatternSet, u: NDArray, v: NDArray, weights: NDArray) -> NDArray:
+    """Basis images (P, n, 3) of transports that are points: u, v (m, n), weights (m, n, 3)."""
+    return np.einsum("pmn,mnc->pnc", patterns.radiance(u, v), weights)
+
+
+def _smooth(seed: int) -> Callable[[NDArray], NDArray]:
+    """A smooth positive light: direction (..., 3) -> radiance (..., 3), quadratic in direction."""
+    rng = np.random.default_rng(seed)
+    slope, form = rng.normal(size=(3, 3)), rng.normal(size=(3, 3, 3))
+
+    def light(d: NDArray) -> NDArray:
+        value = d @ slope + np.einsum("...i,ijc,...j->...c", d, form, d)
+        return 4 + value / 2
+
+    return light
+
+
+def _texel_directions(height: int, width: int) -> NDArray:
+    """(H, W, 3) unit directions of a map's texels, from the formula in the paper's stead:
+    u = 0.5 - atan2(y, x) / 2 pi, v = 0.5 + atan2(z, hypot(x, y)) / pi, v = 0 below."""
+    u = (np.arange(width) + 0.5) / width
+    v = 1 - (np.arange(height) + 0.5) / height
+    azimuth, latitude = (0.5 - u) * 2 * np.pi, (v - 0.5) * np.pi
+    return np.stack(
+        [
+            np.cos(latitude)[:, None] * np.cos(azimuth),
+            np.cos(latitude)[:, None] * np.sin(azimuth),
+            np.broadcast_to(np.sin(latitude)[:, None], (height, width)),
+        ],
+        axis=-1,
+    )
+
+
+def _noisy(seed: int, height: int = 32) -> Environment:
+    """A map of independent texels over three decades."""
+    rng = np.random.default_rng(seed)
+    return Environment((10 ** rng.uniform(-2, 1, (height, 2 * height, 3))).astype(np.float32))
+
+
+class Scene(NamedTuple):
+    """A made-up capture and the truth behind it."""
+
+    hemicube: Hemicube
+    patterns: PatternSet
+    boxes: NDArray  # (K, H, W, 4)
+    coefficient: NDArray  # (K, H, W, 3)
+    basis: NDArray  # (K, P, H, W, 3) float32
+    own: NDArray  # (H, W, 3)
+    alpha: NDArray  # (H, W)
+
+
+def _scene(
+    hemicube: Hemicube,
+    shape: tuple[int, int] = (6, 8),
+    patterns: str = "moments",
+    seed: int = 0,
+    widest: float = 0.9,
+    unlit: float = 0.25,
+) -> Scene:
+    """Random boxes up to `widest` wide; a share `unlit` of the pixel-patch pairs gets no light."""
+    rng = np.random.default_rng(seed)
+    k = len(hemicube)
+    size = rng.uniform(0.05, widest, (k, *shape, 2))
+    low = rng.uniform(0, 1 - size)
+    boxes = np.stack([low[..., 0], low[..., 0] + size[..., 0]], -1)
+    boxes = np.concatenate([boxes, np.stack([low[..., 1], low[..., 1] + size[..., 1]], -1)], -1)
+    coefficient = 10 ** rng.uniform(-2, 0, (k, *shape, 3))
+    coefficient[rng.random((k, *shape)) < unlit] = 0
+    chosen = pattern_set(patterns)
+    basis = _planted(chosen, boxes.reshape(-1, 4), coefficient.reshape(-1, 3))
+    basis = np.moveaxis(basis.reshape(len(chosen), k, *shape, 3), 0, 1).astype(np.float32)
+    own = rng.uniform(0, 2, (*shape, 3)).astype(np.float32)
+    alpha = rng.uniform(0, 1, shape).astype(np.float32)
+    return Scene(hemicube, chosen, boxes, coefficient, basis, own, alpha)
+
+
+def _write_scene(folder: Path, scene: Scene, regions: list[Region] | None = None) -> Path:
+    """A capture set of the scene, of one tile or of one per region."""
+    if regions is None:
+        capture_set.write(
+            folder, scene.hemicube, scene.patterns, scene.basis, scene.own, scene.alpha
+        )
+        return folder
+    height, width = scene.alpha.shape
+    head = capture_set.describe(scene.hemicube, scene.patterns, (height, width))
+    for n, region in enumerate(regions):
+        cut = region.slices
+        rgb = scene.basis.sum(axis=(0, 1), dtype=np.float64)[cut] + scene.own[cut]
+        layers = {"Combined": np.dstack([rgb, scene.alpha[cut]]).astype(np.float32)}
+        for k in range(len(scene.hemicube)):
+            for p, name in enumerate(scene.patterns.patterns):
+                part = f"Combined_{capture_set.group_name(k, name)}"
+                layers[part] = scene.basis[k, p][cut]
+        exr.write(folder / f"tile_{n:04d}.exr", layers)
+        head["tiles"].append(
+            {
+                "region": [region.x, region.y, region.width, region.height],
+                "files": [f"tile_{n:04d}.exr"],
+                "done": True,
+            }
+        )
+    capture_set.write_header(folder, head)
+    return folder
+
+
+def _fitted(capture: Path, folder: Path, choice: str = "box") -> Field:
+    for _ in fit.fit(capture_set.CaptureSet(capture), folder, choice):
+        pass
+    return Field(folder)
+
+
+# Helpers come as fixtures: test files are no package, so they cannot import this one.
+def _helper(function: Callable) -> Callable:
+    return pytest.fixture(scope="session", name=function.__name__.lstrip("_"))(lambda: function)
+
+
+rotation = _helper(_rotation)
+planted = _helper(_planted)
+hits = _helper(_hits)
+smooth = _helper(_smooth)
+texel_directions = _helper(_texel_directions)
+noisy = _helper(_noisy)
+scene = _helper(_scene)
+write_scene = _helper(_write_scene)
+fitted = _helper(_fitted)
+
+
+@pytest.fixture
+def tiny_disk(tmp_path: Path) -> Iterator[Path]:
+    """A disk of 256 kB."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    if sys.platform != "linux" or os.geteuid() != 0:
+        pytest.skip("only root on Linux can mount a tiny disk")
+    done = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=256k", "tmpfs", str(folder)], capture_output=True
+    )
+    if done.returncode:
+        pytest.skip(f"no tiny disk here: {done.stderr.decode().strip()}")
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+@pytest.fixture
+def read_only(tmp_path: Path) -> Iterator[Path]:
+    """A folder that nobody can write to, root included where it can mount one."""
+    folder = tmp_path / "read_only"
+    folder.mkdir()
+    root = hasattr(os, "geteuid") and os.geteuid() == 0
+    if not root:
+        folder.chmod(0o500)
+        yield folder
+        folder.chmod(0o700)
+        return
+    done = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "ro,size=64k", "tmpfs", str(folder)], capture_output=True
+    )
+    if done.returncode:
+        pytest.skip(f"root writes everywhere here: {done.stderr.decode().strip()}")
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", "-l", str(folder)], check=True)

@@ -1,0 +1,71 @@
+"""`core` and Blender do not know each other; modules stay small; EXR files have one door."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import arto.core
+import pytest
+
+CORE = Path(arto.core.__file__).parent
+MODULES = sorted(CORE.rglob("*.py"))
+NAMES = [".".join(("arto", "core", *m.relative_to(CORE).with_suffix("").parts)) for m in MODULES]
+BLENDER = {"bpy", "mathutils", "gpu", "bmesh", "bpy_extras", "bl_ui", "blf", "imbuf"}
+
+
+def imported(module: Path) -> set[str]:
+    """The first name of everything that a module imports, wherever in it."""
+    out = set()
+    for node in ast.walk(ast.parse(module.read_text())):
+        if isinstance(node, ast.Import):
+            out |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            out |= {node.module.split(".")[0]} if node.module and not node.level else set()
+            out |= {a.name for a in node.names} if node.level else set()
+            if node.level and node.module:
+                out |= set(node.module.split("."))
+        elif isinstance(node, ast.Constant) and node.value in BLENDER:
+            out.add(str(node.value))  # import_module("bpy")
+    return out
+
+
+def test_the_walk_sees_imports_of_every_kind(tmp_path: Path) -> None:
+    sly = tmp_path / "sly.py"
+    sly.write_text(
+        "def f():\n import bpy.types\n from mathutils import Vector\n"
+        " import_module('gpu')\n from ..arto_addon import plate\n"
+    )
+    assert {"bpy", "mathutils", "gpu", "arto_addon"} <= imported(sly)
+    assert len(MODULES) > 15
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda m: str(m.relative_to(CORE)))
+def test_core_module_is_free_of_blender_and_small(module: Path) -> None:
+    assert not imported(module) & (BLENDER | {"arto_addon"})
+    assert ("OpenEXR" in imported(module)) == (module.name == "exr.py")
+    assert len(module.read_text().splitlines()) < 400
+
+
+def in_new_process(code: str) -> str:
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def test_importing_core_loads_nothing_of_blender() -> None:
+    names = [n.removesuffix(".__init__") for n in NAMES]
+    loads = f"import importlib, sys; [importlib.import_module(n) for n in {names}]"
+    found = in_new_process(f"{loads}; print(sorted(set(sys.modules) & {BLENDER}))")
+    assert found == "[]"
+
+
+def test_the_root_package_imports_where_there_is_no_bpy() -> None:
+    # None in sys.modules makes `import bpy` fail, as where Blender is not installed
+    code = (
+        "import sys; sys.modules['bpy'] = None; import arto; "
+        "print(callable(arto.register), callable(arto.unregister), 'arto.arto_addon' in sys.modules)"
+    )
+    assert in_new_process(code) == "True True False"

@@ -1,0 +1,186 @@
+"""Moments and supports: boxes that were planted come back, noise does no harm (paper 5)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from arto.core.choice import BROAD, CHOICES, check, choose
+from arto.core.errors import FieldError, PatternError
+from arto.core.moments import UNIFORM_VARIANCE, Moments
+from arto.core.patterns import UU, VV, U, V, pattern_set
+from arto.core.supports import BOX, BY_CODE, LINEAR, NOTHING, SUPPORTS, WHOLE
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+MOMENTS = pattern_set("moments")
+seeds = st.integers(0, 2**31)
+unit = st.floats(0, 1, allow_subnormal=False)
+boxes = st.lists(st.tuples(unit, unit, unit, unit), min_size=1, max_size=20).map(
+    lambda rows: np.array([[*sorted(r[:2]), *sorted(r[2:])] for r in rows])
+)
+
+
+@pytest.mark.parametrize("name", ["moments", "moments_uv"])
+@given(box=boxes, seed=seeds, exposure=st.floats(-6, 6))
+def test_planted_boxes_come_back(planted, name: str, box, seed: int, exposure: float) -> None:
+    """In closed form, at any exposure and any colour, points included."""
+    r = 10**exposure * np.random.default_rng(seed).uniform(0.01, 1, (len(box), 3))
+    moments = Moments.from_basis(planted(pattern_set(name), box, r), pattern_set(name))
+    np.testing.assert_allclose(BOX.fit(moments), box, atol=1e-5)
+    np.testing.assert_allclose(moments.coefficient, r, rtol=1e-12)
+    np.testing.assert_allclose(LINEAR.fit(moments)[:, 0], (box[:, 0] + box[:, 1]) / 2, atol=1e-12)
+    np.testing.assert_allclose(LINEAR.fit(moments)[:, 1], (box[:, 2] + box[:, 3]) / 2, atol=1e-12)
+    if name == "moments_uv":
+        np.testing.assert_allclose(moments.covariance, 0, atol=1e-12)
+
+
+@given(box=boxes)
+def test_boxes_come_back_from_single_precision_images(planted, box) -> None:
+    """A render gives float32: a narrow box is then good to the root of its rounding."""
+    basis = planted(MOMENTS, box, np.ones((len(box), 3))).astype(np.float32)
+    found = BOX.fit(Moments.from_basis(basis, MOMENTS))
+    np.testing.assert_allclose(found, box, atol=2 * np.sqrt(3 * 2**-24))
+
+
+def test_mean_and_variance_are_those_of_the_transport(hits) -> None:
+    rng = np.random.default_rng(1)
+    u, v = rng.random((2, 50, 9))
+    weights = rng.exponential(size=(50, 9, 3))
+    moments = Moments.from_basis(
+        hits(pattern_set("moments_uv"), u, v, weights), pattern_set("moments_uv")
+    )
+    w = weights.sum(axis=-1)  # the channels share a support
+    for n in range(9):
+        covariance = np.cov(u[:, n], v[:, n], aweights=w[:, n], ddof=0)
+        assert moments.mean[0][n] == pytest.approx(np.average(u[:, n], weights=w[:, n]))
+        assert moments.mean[1][n] == pytest.approx(np.average(v[:, n], weights=w[:, n]))
+        assert moments.variance[0][n] == pytest.approx(covariance[0, 0])
+        assert moments.variance[1][n] == pytest.approx(covariance[1, 1])
+        assert moments.covariance[n] == pytest.approx(covariance[0, 1])
+
+
+@given(u=st.tuples(unit, unit), v=st.tuples(unit, unit), share=st.floats(0.001, 0.999))
+def test_two_hits_never_leave_the_patch(hits, u, v, share: float) -> None:
+    """The support of a diffuse pixel that a patch hit twice (docs/measurements.md): its box holds
+    the mean of the two, and is cut at the patch and nowhere else."""
+    weights = np.array([share, 1 - share])[:, None, None] * np.ones((2, 1, 3))
+    basis = hits(MOMENTS, np.array(u)[:, None], np.array(v)[:, None], weights)
+    box = BOX.fit(Moments.from_basis(basis, MOMENTS))[0]
+    assert (box >= 0).all() and (box <= 1).all()
+    for (a, b), (low, high) in zip((u, v), (box[:2], box[2:]), strict=True):
+        mean = share * a + (1 - share) * b
+        half = np.sqrt(3 * share * (1 - share)) * abs(a - b)
+        assert low == pytest.approx(max(mean - half, 0), abs=1e-7)
+        assert high == pytest.approx(min(mean + half, 1), abs=1e-7)
+
+
+def test_no_light_means_the_whole_patch_and_no_entry() -> None:
+    moments = Moments.from_basis(np.zeros((5, 3, 3), np.float32), MOMENTS)
+    np.testing.assert_allclose(moments.mean, 0.5)
+    np.testing.assert_allclose(moments.variance, UNIFORM_VARIANCE)
+    np.testing.assert_allclose(BOX.fit(moments), [[0, 1, 0, 1]] * 3, atol=1e-12)
+    for name in CHOICES:
+        codes, parameters = choose(name, moments)
+        assert (codes == NOTHING).all()
+        assert all(len(p) == 0 for p in parameters.values())
+
+
+@given(seed=seeds, few=st.integers(1, 4))
+def test_noise_that_the_patterns_share_gives_no_negative_variance(hits, seed, few: int) -> None:
+    """Patterns of one render see the same few paths: their moments are those of the sampled light,
+    so the variances need no clipping. With paths of their own they would."""
+    rng = np.random.default_rng(seed)
+    u, v = rng.random((2, few, 200))
+    weights = 10 ** rng.uniform(-3, 3, (few, 200, 3))
+    shared = hits(MOMENTS, u, v, weights)
+
+    def raw_variance(basis: np.ndarray) -> np.ndarray:
+        m = MOMENTS.moments(basis.sum(axis=-1))
+        return np.stack([m[UU] / m[0] - (m[U] / m[0]) ** 2, m[VV] / m[0] - (m[V] / m[0]) ** 2])
+
+    assert raw_variance(shared).min() > -1e-12
+    apart = np.stack(
+        [
+            hits(MOMENTS, *rng.random((2, few, 200)), 10 ** rng.uniform(-3, 3, (few, 200, 3)))[p]
+            for p in range(5)
+        ]
+    )
+    assert raw_variance(apart).min() < -0.01
+
+
+@given(
+    basis=hnp.arrays(
+        np.float32, (5, 6, 3), elements=st.floats(0, 1e6, width=32, allow_subnormal=False)
+    )
+)
+def test_whatever_the_images_hold_the_support_stays_in_the_patch(basis) -> None:
+    """Denoised or photographed patterns need not fit together: the moments are held inside what
+    a transport on the patch can have."""
+    moments = Moments.from_basis(basis, MOMENTS)
+    for mean, variance in zip(moments.mean, moments.variance, strict=True):
+        assert (mean >= 0).all() and (mean <= 1).all()
+        assert (variance >= 0).all()
+        assert (variance <= mean * (1 - mean) + 1e-12).all()
+    box = BOX.fit(moments)
+    assert (box >= 0).all() and (box <= 1).all()
+    assert (box[:, 0] <= box[:, 1]).all() and (box[:, 2] <= box[:, 3]).all()
+
+
+def test_the_papers_set_tells_the_mean_and_marks_the_rest(planted) -> None:
+    paper = pattern_set("paper")
+    box = np.array([[0.1, 0.5, 0.3, 0.4]])
+    moments = Moments.from_basis(planted(paper, box, np.ones((1, 3))), paper)
+    np.testing.assert_allclose(np.ravel(moments.mean), (0.3, 0.35), atol=1e-9)
+    np.testing.assert_allclose(moments.coefficient, 1, atol=1e-9)
+    assert np.isnan(moments.normalised[[UU, VV]]).all()
+
+
+def test_auto_takes_the_plane_for_broad_light_and_the_box_for_narrow(planted) -> None:
+    h = BROAD
+    box = np.array(
+        [
+            [0.5 - h - 0.01, 0.5 + h + 0.01, 0.5 - h - 0.01, 0.5 + h + 0.01],
+            [0.5 - h + 0.01, 0.5 + h - 0.01, 0.0, 1.0],  # narrow one way
+            [0.0, 1.0, 0.2, 0.3],
+            [0.2, 0.9, 0.1, 0.9],
+            [0.3, 0.4, 0.3, 0.4],
+        ]
+    )
+    r = np.ones((5, 3))
+    r[3] = 0  # no light
+    codes, parameters = choose("auto", Moments.from_basis(planted(MOMENTS, box, r), MOMENTS))
+    assert codes.tolist() == [LINEAR.code, BOX.code, BOX.code, NOTHING, BOX.code]
+    np.testing.assert_allclose(parameters[BOX.code], box[[1, 2, 4]], atol=1e-9)
+    np.testing.assert_allclose(parameters[LINEAR.code], [[0.5, 0.5]], atol=1e-9)
+
+
+@pytest.mark.parametrize("name", list(SUPPORTS))
+def test_one_model_for_all_takes_every_lit_pixel(planted, name: str) -> None:
+    r = np.array([[1.0, 0, 0], [0, 0, 0], [0, 0, 1e-6]])  # one channel is enough
+    box = np.array([[0.1, 0.2, 0.3, 0.4]] * 3)
+    codes, parameters = choose(name, Moments.from_basis(planted(MOMENTS, box, r), MOMENTS))
+    support = SUPPORTS[name]
+    assert codes.tolist() == [support.code, NOTHING, support.code]
+    assert parameters[support.code].shape == (2, len(support.parameters))
+
+
+def test_codes_are_for_good() -> None:
+    """They stand in files: a number is never used for another model."""
+    assert {s.name: s.code for s in SUPPORTS.values()} == {"whole": 1, "linear": 2, "box": 3}
+    assert BY_CODE == {1: WHOLE, 2: LINEAR, 3: BOX} and NOTHING not in BY_CODE
+
+
+def test_a_choice_that_cannot_be() -> None:
+    with pytest.raises(FieldError, match="no support model 'gauss': choose one of auto, whole"):
+        check("gauss", MOMENTS)
+    for choice in ("auto", "box"):
+        with pytest.raises(PatternError, match="needs the moments u2, v2"):
+            check(choice, pattern_set("paper"))
+    for choice in ("linear", "whole"):
+        check(choice, pattern_set("paper"))
+    with pytest.raises(PatternError, match="'linear' needs the moments u, v"):
+        check("linear", pattern_set("white"))
+    check("whole", pattern_set("white"))
+    for choice in CHOICES:
+        check(choice, MOMENTS)

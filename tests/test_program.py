@@ -1,0 +1,333 @@
+"""The extension in the real program: built, installed from its zip, and run as artists run it.
+
+These need a Blender executable: BLENDER is the command line that starts it. Preferences and
+extensions go to a folder of their own; a person's own are not touched.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shlex
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from arto.core import exr
+from bench import package
+
+pytestmark = pytest.mark.skipif(
+    not os.environ.get("BLENDER"),
+    reason="BLENDER is not set: it is the command line of the Blender executable to test in",
+)
+ROOT = Path(package.ROOT)
+WIDTH, HEIGHT = 64, 48
+# What is left after one capture at 2x2 patches a side: mostly its noise.
+TOLERANCE = 0.1
+BATCH = "import bpy; bpy.ops.arto.capture(); bpy.ops.arto.fit(); bpy.ops.arto.relight()"
+
+MAKE_SCENE = f"""
+import sys
+sys.path.insert(0, {str(ROOT)!r})
+import bpy
+from bench import scenes
+
+path, camera = sys.argv[-2:]
+scene = scenes.product_shot(width={WIDTH}, height={HEIGHT})
+scenes.set_world_hdri(scene, "sunset")
+bpy.ops.preferences.addon_enable(module="bl_ext.user_default.arto")
+scene.arto.patches = 2
+scene.arto.samples = 256
+if camera == "none":
+    bpy.data.objects.remove(scene.camera)
+bpy.ops.wm.save_as_mainfile(filepath=path)
+if camera != "none":
+    settings = scene.render.image_settings
+    settings.file_format, settings.color_depth = "OPEN_EXR", "32"
+    scene.render.filepath = path + ".reference.exr"
+    scene.cycles.samples = 256
+    bpy.ops.render.render(write_still=True)
+"""
+
+
+class Program:
+    """Blender with the extension installed, and its user's files in `home`."""
+
+    def __init__(self, home: Path) -> None:
+        self.home = home
+        self.environment = {**os.environ, "BLENDER_USER_RESOURCES": str(home)}
+        self.command = shlex.split(os.environ["BLENDER"])
+
+    def run(self, *arguments: str | Path, window: bool = False) -> subprocess.CompletedProcess[str]:
+        """Run it to its end; in a window, on a display of its own."""
+        screen = ["xvfb-run", "-a", "-s", "-screen 0 1600x900x24"] if window else []
+        line = [*screen, *self.command, *map(str, arguments)]
+        return subprocess.run(
+            line, cwd=ROOT, env=self.environment, capture_output=True, text=True, timeout=300
+        )
+
+    def script(self, text: str, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
+        """Run a script in it, without a window; it must succeed."""
+        done = self.run("-b", "--python-exit-code", "1", "--python-expr", text, "--", *arguments)
+        assert done.returncode == 0, said(done)
+        return done
+
+
+def said(done: subprocess.CompletedProcess[str]) -> str:
+    return f"exit code {done.returncode}\n{done.stdout}\n{done.stderr}"
+
+
+@pytest.fixture(scope="session")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Program]:
+    home = tmp_path_factory.mktemp("blender")
+    out = Program(home)
+    zipped = package.build(only_here=True)
+    install = ("--command", "extension", "install-file", "-r", "user_default", "--enable", zipped)
+    done = out.run(*install)
+    assert 'Installed "arto"' in done.stdout, said(done)
+    yield out
+    shutil.rmtree(home, ignore_errors=True)
+
+
+@pytest.fixture(scope="session")
+def made(program: Program, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with scene.blend and what Cycles itself shows of it."""
+    folder = tmp_path_factory.mktemp("made")
+    program.script(MAKE_SCENE, folder / "scene.blend", "camera")
+    return folder
+
+
+@pytest.fixture
+def scene(made: Path, tmp_path: Path) -> Path:
+    """The scene's .blend, in a folder of the test's own."""
+    return Path(shutil.copy(made / "scene.blend", tmp_path))
+
+
+@pytest.fixture(scope="session")
+def reference(made: Path) -> np.ndarray:
+    return next(iter(exr.read(made / "scene.blend.reference.exr").values()))[..., :3]
+
+
+def relit(folder: Path) -> np.ndarray:
+    """The one relit EXR that lies beside the scene -> (H, W, 4)."""
+    (path,) = folder.glob("*.exr")
+    return next(iter(exr.read(path).values()))
+
+
+def check_picture(picture: np.ndarray, reference: np.ndarray) -> None:
+    """Complete, and what Cycles shows, but for the noise."""
+    assert picture.shape == (HEIGHT, WIDTH, 4)
+    assert np.isfinite(picture).all()
+    assert picture[..., :3].mean() > 0.01
+    def e(a,b):
+        return (np.abs(a - b) / (b + 0.01 * b.mean())).mean()
+    def bl(a): return a[..., :3].reshape(HEIGHT//8,8,WIDTH//8,8,3).mean(axis=(1,3))
+    error = np.abs(picture[..., :3] - reference) / (reference + 0.01 * reference.mean())
+    print("error", error.mean(), "ratio", picture[..., :3].mean() / reference.mean(), e(bl(picture), bl(reference)), (np.abs(bl(picture)-bl(reference))/bl(reference)).max())
+    assert error.mean() < TOLERANCE
+    assert picture[..., :3].mean() == pytest.approx(reference.mean(), rel=0.03)
+
+
+def check_quiet(done: subprocess.CompletedProcess[str]) -> None:
+    """No complaint of an OpenEXR that works on another's data, no Python error."""
+    assert "EXR_ERR" not in done.stdout + done.stderr, said(done)
+    assert "Traceback" not in done.stdout + done.stderr, said(done)
+
+
+def test_batch_line(program: Program, scene: Path, reference: np.ndarray) -> None:
+    done = program.run("-b", scene, "--python-exit-code", "1", "--python-expr", BATCH)
+    assert done.returncode == 0, said(done)
+    check_quiet(done)
+    for job in ("capture", "fit", "relight"):
+        assert re.search(rf"^ARTO {job}: 100%", done.stdout, re.MULTILINE), said(done)
+    check_picture(relit(scene.parent), reference)
+
+
+def test_command(program: Program, scene: Path, reference: np.ndarray) -> None:
+    """The three jobs in three processes, their files where the options say."""
+    folder, output = scene.parent / "kept", scene.parent / "out" / "picture.exr"
+    jobs = (
+        ("capture", "--folder", folder, "--patches", "1", "--samples", "32", "--faces", "top"),
+        ("capture", "--folder", folder, "--preset", "full", "--patches", "2", "--samples", "256"),
+        ("fit", "--folder", folder, "--support", "auto"),
+        ("relight", "--folder", folder, "--output", output, "--environment-width", "512"),
+    )
+    for job in jobs:
+        done = program.run("-b", scene, "--command", "arto", *job)
+        assert done.returncode == 0, said(done)
+        check_quiet(done)
+        assert f"ARTO {job[0]}: 100%" in done.stdout
+    check_picture(relit(output.parent), reference)
+    assert not (scene.parent / "arto").exists()
+
+
+def test_command_help(program: Program) -> None:
+    done = program.run("--command", "arto", "--help")
+    assert done.returncode == 0, said(done)
+    for job in ("capture", "fit", "relight"):
+        assert job in done.stdout
+    done = program.run("--command", "arto", "capture", "--help")
+    assert done.returncode == 0, said(done)
+    assert "--patches" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (("fit",), 1, "run Capture first"),
+        (("relight",), 1, "ARTO: "),
+        (("capture", "--patches", "17"), 2, "out of range"),
+        (("capture", "--no-such"), 2, "--no-such"),
+        (("develop",), 2, "develop"),
+        (("fit", "--scene", "Nowhere"), 2, "no scene 'Nowhere'"),
+    ],
+)
+def test_command_failures(
+    program: Program, scene: Path, arguments: tuple[str, ...], code: int, message: str
+) -> None:
+    done = program.run("-b", scene, "--command", "arto", *arguments)
+    assert done.returncode == code, said(done)
+    assert message in done.stderr, said(done)
+    check_quiet(done)
+
+
+def test_without_camera(program: Program, tmp_path: Path) -> None:
+    path = tmp_path / "scene.blend"
+    program.script(MAKE_SCENE, path, "none")
+    done = program.run("-b", path, "--command", "arto", "capture")
+    assert done.returncode == 1, said(done)
+    assert "the scene has no camera" in done.stderr
+    done = program.run("-b", path, "--python-exit-code", "1", "--python-expr", BATCH)
+    assert done.returncode == 1, said(done)
+    assert "The scene has no camera" in done.stdout + done.stderr, said(done)
+
+
+def test_batch_stops_at_the_first_failure(program: Program, scene: Path) -> None:
+    line = "import bpy; bpy.ops.arto.fit(); bpy.ops.arto.relight()"
+    done = program.run("-b", scene, "--python-exit-code", "1", "--python-expr", line)
+    assert done.returncode == 1, said(done)
+    assert "Capture the scene first" in done.stdout + done.stderr, said(done)
+
+
+# Presses the buttons one after the other, as an artist would who waits for each. `PRESS` is a list
+# of (operator, seconds until ESC or None). What is in the file is counted before and after each.
+BUTTONS = """
+import json, sys, time, traceback
+import bpy
+
+presses, report = json.loads(sys.argv[-2]), sys.argv[-1]
+found = []
+state = {"at": -1, "since": 0.0, "escaped": False}
+
+
+def contents():
+    render = bpy.context.scene.render
+    kinds = ("scenes", "objects", "meshes", "materials", "worlds", "collections", "cameras")
+    return {
+        **{kind: len(getattr(bpy.data, kind)) for kind in kinds},
+        "samples": bpy.context.scene.cycles.samples,
+        "filepath": render.filepath,
+        "size": [render.resolution_x, render.resolution_y],
+        "groups": len(bpy.context.view_layer.lightgroups),
+        "display": bpy.context.preferences.view.render_display_type,
+        "timers_run": len(bpy.app.handlers.render_complete),
+    }
+
+
+def running(window):
+    return any(o.bl_idname.startswith("ARTO_OT") for o in window.modal_operators)
+
+
+def step():
+    window = bpy.context.window_manager.windows[0]
+    if state["at"] >= 0 and running(window):
+        operator, escape = presses[state["at"]]
+        late = time.monotonic() - state["since"]
+        if late > 60:
+            raise TimeoutError(operator)
+        if escape is not None and late > escape and not state["escaped"]:
+            state["escaped"] = True
+            window.event_simulate(type="ESC", value="PRESS", x=9, y=9)
+            window.event_simulate(type="ESC", value="RELEASE", x=9, y=9)
+        return 0.02
+    if state["at"] >= 0:
+        found[-1]["after"] = contents()
+        found[-1]["seconds"] = time.monotonic() - state["since"]
+        found[-1]["escaped"] = state["escaped"]
+    state["at"] += 1
+    if state["at"] == len(presses):
+        nodes = bpy.context.scene.compositing_node_group
+        image = bpy.data.images.get("ARTO Relit")
+        end = {
+            "nodes": [n.bl_idname for n in nodes.nodes] if nodes else [],
+            "image": list(image.size) if image else None,
+        }
+        finish({"presses": found, **end})
+        return None
+    operator, _ = presses[state["at"]]
+    found.append({"operator": operator, "before": contents()})
+    state["since"], state["escaped"] = time.monotonic(), False
+    area = next(a for a in window.screen.areas if a.type == "PROPERTIES")
+    with bpy.context.temp_override(window=window, area=area):
+        getattr(bpy.ops.arto, operator)("INVOKE_DEFAULT")
+    return 0.02
+
+
+def finish(what):
+    with open(report, "w") as f:
+        json.dump(what, f)
+    bpy.ops.wm.quit_blender()
+
+
+def safely():
+    try:
+        return step()
+    except BaseException:
+        finish({"error": traceback.format_exc()})
+
+
+bpy.app.timers.register(safely, first_interval=1.0)
+"""
+
+
+def press(program: Program, scene: Path, *presses: tuple[str, float | None]) -> dict:
+    """Press buttons in the program's window -> what was there before and after each."""
+    if not shutil.which("xvfb-run"):
+        pytest.skip("xvfb-run is not installed: the window needs a display")
+    script, report = scene.parent / "press.py", scene.parent / "report.json"
+    script.write_text(BUTTONS)
+    window = (scene, "--enable-event-simulate", "--python", script)
+    done = program.run(*window, "--", json.dumps(presses), report, window=True)
+    assert report.is_file(), said(done)
+    out = json.loads(report.read_text())
+    assert "error" not in out, out["error"]
+    check_quiet(done)
+    return out
+
+
+def test_buttons(program: Program, scene: Path, reference: np.ndarray) -> None:
+    out = press(program, scene, ("capture", None), ("fit", None), ("relight", None))
+    for pressed in out["presses"][:2]:
+        assert pressed["before"] == pressed["after"]
+    assert out["image"] == [WIDTH, HEIGHT]
+    assert "CompositorNodeGroup" in out["nodes"]
+    check_picture(relit(scene.parent), reference)
+
+
+def test_escape_in_the_middle(program: Program, scene: Path, reference: np.ndarray) -> None:
+    """ESC during the capture's render leaves the scene as it was; the next capture is whole."""
+    program.script(
+        "import bpy, sys; path = sys.argv[-1]; bpy.ops.wm.open_mainfile(filepath=path);"
+        "bpy.context.scene.arto.samples = 1 << 16; bpy.ops.wm.save_mainfile()",
+        scene,
+    )
+    out = press(program, scene, ("capture", 2.0))
+    (pressed,) = out["presses"]
+    assert pressed["escaped"]
+    assert pressed["seconds"] < 20
+    assert pressed["before"] == pressed["after"]
+    assert not list((scene.parent / "arto").rglob("*.exr*"))
