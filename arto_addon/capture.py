@@ -13,6 +13,7 @@ import bpy
 
 from ..core import exr
 from ..core.capture_set import (
+    GRAIN,
     GROUP,
     HEADER,
     VERSION,
@@ -53,7 +54,9 @@ def check_scene(scene: bpy.types.Scene) -> None:
                 "fog into an object around the scene instead"
             )
     things = list(scene.objects)
-    things += [o for e in things if e.instance_collection for o in e.instance_collection.all_objects]
+    things += [
+        o for e in things if e.instance_collection for o in e.instance_collection.all_objects
+    ]
     # a lamp's own flag means nothing
     catchers = [
         o.name for o in things if o.type != "LIGHT" and o.is_shadow_catcher and not o.hide_render
@@ -83,14 +86,17 @@ def tiles_of(region: Region, passes: int, budget_megabytes: int) -> list[Region]
     ]
 
 
-def render_plan(route: str, hemicube: Hemicube, patterns: PatternSet) -> list[list[tuple]]:
-    """The (patch, pattern) images of each render."""
-    k, p = range(len(hemicube)), range(len(patterns))
+def render_plan(
+    route: str, hemicube: Hemicube, patterns: PatternSet, grain: bool
+) -> list[list[tuple[int, str]]]:
+    """The (patch, pattern name) images of each render."""
+    k = range(len(hemicube))
     if route == "all":
-        return [[(i, j) for i in k for j in p]]
+        names = [*patterns.patterns, GRAIN] if grain else patterns.patterns
+        return [[(i, name) for i in k for name in names]]
     if route == "pattern":
-        return [[(i, j) for i in k] for j in p]
-    return [[(i, j)] for i in k for j in p]
+        return [[(i, name) for i in k] for name in patterns.patterns]
+    return [[(i, name)] for i in k for name in patterns.patterns]
 
 
 def picture_region(scene: bpy.types.Scene) -> Region:
@@ -192,9 +198,9 @@ def _begin(folder: Path, head: dict[str, Any]) -> list[dict[str, Any]]:
     return head["tiles"]
 
 
-def _check_file(path: Path, images: list[tuple], patterns: PatternSet) -> None:
+def _check_file(path: Path, images: list[tuple[int, str]]) -> None:
     """Raise CaptureSetError unless Blender wrote all of a render."""
-    expected = {group_name(k, patterns.patterns[p]) for k, p in images}
+    expected = {group_name(k, name) for k, name in images}
     found = set()
     for name in exr.part_names(path):
         if match := GROUP.search(name):
@@ -219,9 +225,11 @@ def capture(scene: bpy.types.Scene, view_layer: str) -> Steps:
     region = picture_region(scene)
     with stage(scene, view_layer) as on:
         hemicube = geometry(scene, on)
-        plan = render_plan(settings.route, hemicube, patterns)
+        # between renders the paths differ, and grain would not be theirs
+        grain = settings.grain and settings.route == "all"
+        plan = render_plan(settings.route, hemicube, patterns, grain)
         tiles = tiles_of(region, max(map(len, plan)), settings.memory)
-        prepare(on, layers=len(patterns))
+        prepare(on, layers=len(patterns) + grain)
         head = describe(
             hemicube,
             patterns,
@@ -234,6 +242,7 @@ def capture(scene: bpy.types.Scene, view_layer: str) -> Steps:
             samples=settings.samples,
             seed=settings.seed,
             route=settings.route,
+            grain=grain,
             blender=bpy.app.version_string,
             colour_space=bpy.data.colorspace.working_space,
             film_transparent=scene.render.film_transparent,
@@ -273,7 +282,7 @@ def _render(
     on: Stage,
     hemicube: Hemicube,
     patterns: PatternSet,
-    images: list[tuple],
+    images: list[tuple[int, str]],
     path: Path,
     share: float,
     text: str,
@@ -289,9 +298,9 @@ def _render(
     layer = on.scene.view_layers[0]
     collection = note(bpy.data.collections.new("ARTO Capture"))
     on.scene.collection.children.link(collection)
-    hemicube_planes.build(collection, hemicube, patterns, note, images)
-    for k, p in images:
-        layer.lightgroups.add(name=group_name(k, patterns.patterns[p]))
+    hemicube_planes.build(collection, hemicube, patterns, images, note)
+    for k, name in images:
+        layer.lightgroups.add(name=group_name(k, name))
     on.scene.render.filepath = str(partial)
     request = Render(on.scene.name, share, text)
     try:
@@ -302,7 +311,7 @@ def _render(
                 f"Blender did not write {path}: make room on the disk, or choose a folder that "
                 "can be written"
             )
-        _check_file(partial, images, patterns)
+        _check_file(partial, images)
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)

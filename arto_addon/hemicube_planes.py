@@ -10,9 +10,9 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..core.capture_set import group_name
+from ..core.capture_set import GRAIN, group_name
 from ..core.hemicube import FACE_NAMES, Hemicube
-from ..core.patterns import PatternSet
+from ..core.patterns import PatternSet, pattern_set
 
 COLLECTION = "ARTO Hemicube"
 FAR = 1000.0
@@ -40,57 +40,83 @@ def wanted(scene: bpy.types.Scene, centre: Iterable[float], radius: float) -> He
     )
 
 
-def pattern_material(pattern: str, coefficients: Iterable[float], opaque: bool) -> Any:
-    """Emission of a polynomial of the patch coordinates (its UV map), plus what lies behind."""
-    material = bpy.data.materials.new(f"ARTO {pattern}")
+# Grains along a patch's side: far finer than what a pixel's reflection spans.
+GRAINS = 2.0**14
+
+
+class _Nodes:
+    """A few calls that make building a node tree read like the formula it is."""
+
+    def __init__(self, tree: Any) -> None:
+        self.tree = tree
+
+    def add(self, kind: str, *inputs: Any, operation: str = "") -> Any:
+        """A node with its inputs linked (sockets) or set (values)."""
+        node = self.tree.nodes.new(kind)
+        if operation:
+            node.operation = operation
+        for socket, value in zip(node.inputs, inputs, strict=False):
+            if isinstance(value, bpy.types.NodeSocket):
+                self.tree.links.new(value, socket)
+            else:
+                socket.default_value = value
+        return node
+
+    def math(self, operation: str, *inputs: Any) -> Any:
+        return self.add("ShaderNodeMath", *inputs, operation=operation).outputs[0]
+
+    def polynomial(self, coefficients: Iterable[float]) -> Any:
+        """The value of a polynomial over `patterns.MONOMIALS` of the UV map."""
+        split = self.add("ShaderNodeSeparateXYZ", self.add("ShaderNodeUVMap").outputs[0])
+        u, v = split.outputs[0], split.outputs[1]
+        terms = (
+            1.0,
+            u,
+            self.math("MULTIPLY", u, u),
+            v,
+            self.math("MULTIPLY", v, v),
+            self.math("MULTIPLY", u, v),
+        )
+        total: Any = 0.0
+        for coefficient, term in zip(coefficients, terms, strict=True):
+            if coefficient:
+                total = self.math("MULTIPLY_ADD", term, float(coefficient), total)
+        return total
+
+    def grain(self) -> Any:
+        """1 on half of the grains, 0 on the others, without order."""
+        scaled = self.add(
+            "ShaderNodeVectorMath",
+            self.add("ShaderNodeUVMap").outputs[0],
+            (GRAINS,) * 3,
+            operation="MULTIPLY",
+        )
+        cell = self.add("ShaderNodeVectorMath", scaled.outputs[0], operation="FLOOR")
+        noise = self.tree.nodes.new("ShaderNodeTexWhiteNoise")
+        noise.noise_dimensions = "3D"
+        self.tree.links.new(cell.outputs[0], noise.inputs["Vector"])
+        return self.math("GREATER_THAN", noise.outputs["Value"], 0.5)
+
+
+def pattern_material(name: str, patterns: PatternSet, opaque: bool) -> Any:
+    """Emission of a pattern of the set (or of `GRAIN`), plus what lies behind."""
+    material = bpy.data.materials.new(f"ARTO {name}")
     # paths find the patches; no shadow ray is ever cast at them, so Cycles' limit of 255 light
     # groups for sampled lights does not apply
     material.cycles.emission_sampling = "NONE"
     tree = material.node_tree
     tree.nodes.clear()
-    node: Callable[[str], Any] = tree.nodes.new
-    link = tree.links.new
-
-    def math_node(operation: str, *inputs: Any) -> Any:
-        out = node("ShaderNodeMath")
-        out.operation = operation
-        for socket, value in zip(out.inputs, inputs, strict=False):
-            if isinstance(value, float):
-                socket.default_value = value
-            else:
-                link(value, socket)
-        return out.outputs[0]
-
-    split = node("ShaderNodeSeparateXYZ")
-    link(node("ShaderNodeUVMap").outputs[0], split.inputs[0])
-    u, v = split.outputs[0], split.outputs[1]
-    terms = (
-        None,
-        u,
-        math_node("MULTIPLY", u, u),
-        v,
-        math_node("MULTIPLY", v, v),
-        math_node("MULTIPLY", u, v),
-    )
-    total: Any = None
-    for coefficient, term in zip(coefficients, terms, strict=True):
-        if not coefficient:
-            continue
-        constant = float(coefficient)
-        if term is None:
-            value = math_node("ADD", constant, 0.0)
-        else:
-            value = math_node("MULTIPLY", term, constant)
-        total = value if total is None else math_node("ADD", total, value)
-    emission = node("ShaderNodeEmission")
-    link(total, emission.inputs["Strength"])
-    shader = emission.outputs[0]
+    nodes = _Nodes(tree)
+    if name == GRAIN:
+        radiance = nodes.grain()
+    else:
+        row = patterns.coefficients[patterns.patterns.index(name)]
+        radiance = nodes.polynomial(row)
+    shader = nodes.add("ShaderNodeEmission", (1, 1, 1, 1), radiance).outputs[0]
     if not opaque:
-        add = node("ShaderNodeAddShader")
-        link(shader, add.inputs[0])
-        link(node("ShaderNodeBsdfTransparent").outputs[0], add.inputs[1])
-        shader = add.outputs[0]
-    link(shader, node("ShaderNodeOutputMaterial").inputs["Surface"])
+        behind = nodes.add("ShaderNodeBsdfTransparent").outputs[0]
+        shader = nodes.add("ShaderNodeAddShader", shader, behind).outputs[0]
+    nodes.add("ShaderNodeOutputMaterial", shader)
     return material
 
 
@@ -113,30 +139,24 @@ def build(
     collection: bpy.types.Collection,
     hemicube: Hemicube,
     patterns: PatternSet,
+    images: Iterable[tuple[int, str]],
     made: Callable[[Any], Any],
-    images: Iterable[tuple[int, int]] | None = None,
 ) -> None:
-    """Fill `collection` with a plane for each (patch, pattern) of `images` (default: all).
+    """Fill `collection` with a plane for each (patch, pattern name) of `images`.
 
     Each plane carries the light group `capture_set.group_name`. `made` is told of every new
     data-block.
     """
-    if images is None:
-        images = [(k, p) for k in range(len(hemicube)) for p in range(len(patterns))]
-    else:
-        images = list(images)
-    used = sorted({p for _, p in images})
+    images = list(images)
+    used = list(dict.fromkeys(name for _, name in images))
     materials = {
-        p: made(
-            pattern_material(patterns.patterns[p], patterns.coefficients[p], opaque=p == used[-1])
-        )
-        for p in used
+        name: made(pattern_material(name, patterns, opaque=name == used[-1])) for name in used
     }
     centre = np.array(hemicube.centre)
-    for k, p in images:
-        name = group_name(k, patterns.patterns[p])
-        distance = hemicube.size * (1 + GAP * used.index(p))
-        plane = _plane(name, centre + distance * hemicube.corners(k), materials[p], made)
+    for k, pattern in images:
+        name = group_name(k, pattern)
+        distance = hemicube.size * (1 + GAP * used.index(pattern))
+        plane = _plane(name, centre + distance * hemicube.corners(k), materials[pattern], made)
         plane.lightgroup = name
         collection.objects.link(plane)
 
@@ -148,8 +168,8 @@ def build_for_artist(scene: bpy.types.Scene, hemicube: Hemicube, radius: float) 
     collection = bpy.data.collections.new(COLLECTION)
     collection.hide_render = True
     scene.collection.children.link(collection)
-    white = PatternSet("white", ("white",), ((1.0, 0.0, 0.0, 0.0, 0.0, 0.0),))
-    build(collection, hemicube, white, lambda block: block)
+    images = [(k, "white") for k in range(len(hemicube))]
+    build(collection, hemicube, pattern_set("white"), images, lambda block: block)
     collection["arto_hemicube"] = json.dumps(hemicube.to_json())
     collection["arto_radius"] = radius
     return collection

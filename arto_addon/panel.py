@@ -79,6 +79,7 @@ class ARTO_PT_capture(_Panel, bpy.types.Panel):
         settings = context.scene.arto
         for name in (
             "patterns",
+            "grain",
             "route",
             "seed",
             "memory",

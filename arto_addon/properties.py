@@ -122,6 +122,12 @@ class ArtoSettings(bpy.types.PropertyGroup):
         ],
         default="all",
     )
+    grain: BoolProperty(
+        name="Capture Noise",
+        description="One more pattern that shows how noisy each patch's light is, so that the fit "
+        "does not take noise for narrow reflections",
+        default=True,
+    )
     samples: IntProperty(
         name="Samples",
         description="Samples of the capture. Its noise is the main error of the relit picture",

@@ -23,6 +23,25 @@ def _demo(options: argparse.Namespace) -> None:
     print(f"look at {options.out / 'comparison.png'}")
 
 
+def _stability(options: argparse.Namespace) -> None:
+    from .machine import write_rows
+    from .stability import stability, table
+
+    rows = stability()
+    write_rows(options.json, rows)
+    print(table(rows))
+
+
+def _patterns(options: argparse.Namespace) -> None:
+    from arto.core.patterns import MONOMIALS, PATTERN_SETS
+
+    print("| set | patterns | rank | condition | moments that it tells on their own |")
+    print("|---|---|---|---|---|")
+    for s in PATTERN_SETS.values():
+        told = [m for m, seen in zip(MONOMIALS, s.identified, strict=True) if seen]
+        print(f"| `{s.name}` | {len(s)} | {s.rank} | {s.condition:.1f} | {', '.join(told)} |")
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
@@ -35,6 +54,13 @@ def main() -> int:
     c.add_argument("--samples", type=int, default=128)
     c.add_argument("--many", type=int, default=512, help="samples of each of two references")
     c.set_defaults(run=_demo)
+
+    c = commands.add_parser("stability", help="hard synthetic cases for every support model")
+    c.add_argument("--json", type=Path, default=Path("out/stability.json"))
+    c.set_defaults(run=_stability)
+
+    c = commands.add_parser("patterns", help="what each set of patterns can identify")
+    c.set_defaults(run=_patterns)
 
     options = parser.parse_args()
     options.run(options)

@@ -7,6 +7,7 @@ picture (`Combined`, with alpha) and its albedo, normal and depth: docs/capture-
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 from dataclasses import dataclass
@@ -27,6 +28,12 @@ HEADER = "capture.json"
 GROUP = re.compile(r"(?:^|\.)Combined_ARTO_(\d{4})_(\w+)$")
 # Layers beside the basis images, by the end of their part's name.
 GUIDES = {"albedo": "Denoising Albedo", "normal": "Denoising Normal", "depth": "Depth"}
+# The pattern that shows the noise: a patch of grains so fine that no reflection resolves them, half
+# of them lit, at random. A light path meets a lit grain or a dark one as a coin falls, so twice
+# this image less the white one is a sum of the paths' weights with random signs: its square is, on
+# average, the sum of their squares, which is the variance of the white image. It is no polynomial
+# and no part of the pattern set; it must share its render, and so its paths, with the others.
+GRAIN = "grain"
 # What is left of Combined when the groups are taken away, as a share of them, when there is no
 # other light: float32 sums of a few hundred passes.
 ROUNDING = 3e-5
@@ -42,7 +49,9 @@ class TileData:
     """What was captured of one region.
 
     basis: (K, P, h, w, 3) float32; own: (h, w, 3), the light of the scene's own lamps; alpha:
-    (h, w); guides: albedo, normal (h, w, 3), depth (h, w), those that the files hold.
+    (h, w); guides: albedo, normal (h, w, 3), depth (h, w), those that the files hold; grain:
+    (K, h, w), the difference of two random halves of the light, summed over channels, where it was
+    captured (see `GRAIN`).
     """
 
     region: Region
@@ -50,6 +59,7 @@ class TileData:
     own: NDArray[np.float32]
     alpha: NDArray[np.float32]
     guides: dict[str, NDArray[np.float32]]
+    grain: NDArray[np.float32] | None = None
 
 
 class CaptureSet:
@@ -104,6 +114,10 @@ class CaptureSet:
             for k in range(len(self.hemicube))
             for p, name in enumerate(self.patterns.patterns)
         }
+        grain: NDArray | None = None
+        if self.head.get("grain"):
+            grain = np.zeros((len(self.hemicube), *shape), np.float32)
+            wanted |= {(k, GRAIN): (k, -1) for k in range(len(self.hemicube))}
         own: NDArray | None = None
         alpha = np.ones(shape, np.float32)
         guides: dict[str, NDArray] = {}
@@ -125,9 +139,13 @@ class CaptureSet:
                             f"{path} holds the basis image '{part}', which is not of this "
                             "capture set or there twice: capture again"
                         )
-                    at = wanted.pop(key)
-                    basis[at] = self._checked(path, part, pixels, (*shape, 3))
-                    lit += basis[at]
+                    k, p = wanted.pop(key)
+                    image = self._checked(path, part, pixels, (*shape, 3))
+                    lit += image
+                    if p >= 0:
+                        basis[k, p] = image
+                    elif grain is not None:
+                        grain[k] = image.sum(axis=-1)
                 elif part == "Combined" or part.endswith(".Combined"):
                     combined = self._checked(path, part, pixels, (*shape, 4))
                 else:
@@ -149,7 +167,12 @@ class CaptureSet:
                 f"{self.hemicube.patch_name(k)} under '{pattern}': capture again"
             )
         assert own is not None  # a set without files lacks its basis images
-        return TileData(region, basis, np.maximum(own, 0).astype(np.float32), alpha, guides)
+        if grain is not None:
+            for k, image in enumerate(grain):
+                white = self.patterns.coefficient(basis[k]).sum(axis=-1)
+                np.subtract(2 * image, white, out=image)
+        own = np.maximum(own, 0).astype(np.float32)
+        return TileData(region, basis, own, alpha, guides, grain)
 
     @staticmethod
     def _checked(path: Path, part: str, pixels: NDArray, shape: tuple[int, ...]) -> NDArray:
@@ -185,6 +208,8 @@ def write_header(folder: Path, head: dict[str, Any]) -> None:
         partial.write_text(json.dumps(head, indent=1))
         partial.replace(path)
     except OSError as e:
+        with contextlib.suppress(OSError):
+            partial.unlink()
         raise CaptureSetError(
             f"{path} cannot be written ({e}): make room on the disk, or choose a folder that can "
             "be written"

@@ -130,7 +130,7 @@ def read(path: Path) -> dict[str, NDArray]:
         order = sorted(channels, key=lambda c: (_ORDER.find(c) if c in _ORDER else len(_ORDER), c))
         if any(pixels is None for pixels in channels.values()):
             raise ExrError(f"{path} has no pixels in part '{part.header.get('name')}'")
-        if len(channels) == 1:
+        if len(part.channels) == 1:
             pixels = next(iter(channels.values()))[..., None]
         elif len(channels) == len(part.channels) and all(len(c) == 1 for c in channels):
             pixels = np.stack([channels[c] for c in order], axis=-1)

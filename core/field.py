@@ -170,7 +170,7 @@ class Tile:
         path = self.folder / f"{name}.npy"
         try:
             out = np.load(path, mmap_mode="r")
-        except (OSError, ValueError) as e:
+        except (OSError, ValueError, EOFError) as e:
             raise FieldError(f"{path} is missing or damaged ({e}): fit again") from e
         if shape is not None and out.shape != shape:
             raise FieldError(f"{path} has the shape {out.shape}, not {shape}: fit again")

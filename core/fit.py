@@ -7,42 +7,78 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from . import choice as choice_of_support
+import numpy as np
+
+from . import choice as choices
 from .capture_set import CaptureSet, TileData
 from .field import FieldWriter, TileWriter
 from .moments import Moments
 from .patterns import PatternSet
+from .search import search
+from .supports import BOX, WHOLE
 
 
-def fit_tile(data: TileData, patterns: PatternSet, choice: str) -> Iterator[float | TileWriter]:
-    """Fit one tile: yields the share that is done, and last the tile, ready to be written."""
+def fit_tile(
+    data: TileData,
+    patterns: PatternSet,
+    choice: str,
+    samples: float | None = None,
+    separate: bool = False,
+) -> Iterator[float | TileWriter]:
+    """Fit one tile: yields the share that is done, and last the tile, ready to be written.
+
+    samples: samples a pixel of the capture, which tell how far its noise can be believed (None: no
+    noise); separate: a support for each channel.
+    """
     layers = {"own": data.own, "alpha": data.alpha, **data.guides}
     writer = TileWriter(data.region, layers)
     patches = len(data.basis)
+    images = data.basis.reshape(patches, len(patterns), -1, 3)
+    coefficients = np.stack([patterns.coefficient(b) for b in images])
+    shape = (data.region.height, data.region.width)
+    known = choices.evidence(coefficients, shape, samples, data.grain)
+    brightest = coefficients.sum(axis=-1).argmax(axis=0)
     for k in range(patches):
-        basis = data.basis[k].reshape(len(patterns), -1, 3)
-        moments = Moments.from_basis(basis, patterns)
-        codes, parameters = choice_of_support.choose(choice, moments)
+        moments = Moments.from_basis(images[k], patterns, separate)
+        if choice == choices.SEARCH:
+            codes, _ = choices.choose("whole", moments, known, k)
+            boxes = search(images[k], patterns, data.region.height)
+            parameters = {BOX.code: boxes[codes == WHOLE.code]}
+            codes[codes == WHOLE.code] = BOX.code
+        elif choice == choices.STAGE_AND_MATTE:
+            # the straightforward combination: a Light Stage, and one matte where it is brightest
+            codes, _ = choices.choose("whole", moments, known, k)
+            codes[(brightest == k) & (codes == WHOLE.code)] = BOX.code
+            parameters = {s.code: s.fit(moments.select(codes == s.code)) for s in (WHOLE, BOX)}
+        else:
+            codes, parameters = choices.choose(choice, moments, known, k, separate)
         writer.add(codes, moments.coefficient, parameters)
         yield (k + 1) / patches
     yield writer
 
 
 def fit(
-    captured: CaptureSet, folder: Path, choice: str = "auto", **about: Any
+    captured: CaptureSet,
+    folder: Path,
+    choice: str = "auto",
+    separate: bool = False,
+    **about: Any,
 ) -> Iterator[tuple[float, str]]:
     """Fit a whole capture set and write the field: yields (share done, what is being done).
 
-    choice: one of `choice.CHOICES`. The field replaces another in `folder` only when it is
-    complete: closing the generator early leaves what was there. Raises CaptureSetError, FieldError,
-    PatternError.
+    choice: one of `choice.CHOICES`; separate: a support for each channel. The field replaces
+    another in `folder` only when it is complete: closing the generator early leaves what was
+    there. Raises CaptureSetError, FieldError, PatternError.
     """
-    choice_of_support.check(choice, captured.patterns)
+    choices.check(choice, captured.patterns)
+    samples = captured.head.get("samples")
     begun = time.perf_counter()
     reading = 0.0
     keep = ("scene", "colour_space", "samples", "file", "frame")
     about = {key: captured.head[key] for key in keep if key in captured.head} | about
-    writer = FieldWriter(folder, captured.hemicube, captured.shape, choice=choice, **about)
+    writer = FieldWriter(
+        folder, captured.hemicube, captured.shape, choice=choice, separate=separate, **about
+    )
     try:
         tiles = len(captured.regions)
         for tile in range(tiles):
@@ -50,7 +86,7 @@ def fit(
             start = time.perf_counter()
             data = captured.read(tile)
             reading += time.perf_counter() - start
-            for step in fit_tile(data, captured.patterns, choice):
+            for step in fit_tile(data, captured.patterns, choice, samples, separate):
                 if isinstance(step, TileWriter):
                     writer.add(step)
                 else:

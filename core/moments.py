@@ -24,18 +24,36 @@ class Moments:
 
     coefficient: (n, 3) reflection coefficient R per channel. normalised: (6, n) moments shared by
     the channels, over the zeroth; NaN where the patterns cannot tell. A pixel without light from
-    the patch has those of the whole patch.
+    the patch has those of the whole patch. channels: the same for red, green and blue by
+    themselves, where they were asked for.
     """
 
     coefficient: NDArray
     normalised: NDArray
+    channels: tuple[Moments, ...] = ()
 
     @staticmethod
-    def from_basis(basis: NDArray, patterns: PatternSet) -> Moments:
-        """basis: (P, n, 3) -> the moments. The channels share a support, as in the paper (5)."""
+    def from_basis(basis: NDArray, patterns: PatternSet, per_channel: bool = False) -> Moments:
+        """basis: (P, n, 3) -> the moments. The channels share a support, as in the paper (5).
+
+        per_channel: also the moments of each channel by itself, in `channels`.
+        """
         # float64: a narrow support is a small difference of large moments
         shared = patterns.moments(basis.sum(axis=-1, dtype=np.float64))
-        return Moments(patterns.coefficient(basis), normalise(shared))
+        coefficient = patterns.coefficient(basis)
+        channels: tuple[Moments, ...] = ()
+        if per_channel:
+            each = (patterns.moments(basis[..., c].astype(np.float64)) for c in range(3))
+            channels = tuple(Moments(coefficient, normalise(m)) for m in each)
+        return Moments(coefficient, normalise(shared), channels)
+
+    def select(self, pixels: NDArray) -> Moments:
+        """The moments of some of the pixels (a mask or indices)."""
+        return Moments(
+            self.coefficient[pixels],
+            self.normalised[:, pixels],
+            tuple(c.select(pixels) for c in self.channels),
+        )
 
     @cached_property
     def mean(self) -> tuple[NDArray, NDArray]:
@@ -61,7 +79,8 @@ class Moments:
 def normalise(moments: NDArray) -> NDArray:
     """(6, n) moments over the zeroth, held inside what any transport on [0, 1]^2 can have."""
     total = moments[ONE]
-    lit = total > 0
+    # what is not a number is no evidence of a support either
+    lit = (total > 0) & np.isfinite(moments[[ONE, U, V]]).all(axis=0)
     out = moments / np.where(lit, total, 1)
     out[:, ~lit] = np.array([1, 1 / 2, 1 / 3, 1 / 2, 1 / 3, 1 / 4])[:, None]
     out[[U, V]] = np.clip(out[[U, V]], 0, 1)

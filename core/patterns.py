@@ -76,10 +76,12 @@ class PatternSet:
         """Raise PatternError unless every monomial index in `wanted` is identified."""
         missing = [MONOMIALS[m] for m in wanted if not self.identified[m]]
         if missing:
+            able = [s for s in PATTERN_SETS.values() if all(s.identified[m] for m in wanted)]
+            names = " or ".join(f"'{s.name}'" for s in able)
             raise PatternError(
                 f"{what} needs the moments {', '.join(missing)}, which the pattern set "
-                f"'{self.name}' cannot tell. Capture with the pattern set 'moments' or "
-                "'moments_uv', or choose another support model."
+                f"'{self.name}' cannot tell. Capture with the pattern set {names}, "
+                "or choose another support model."
             )
 
     def coefficient(self, basis: NDArray) -> NDArray:

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 from .base import Support
 from .box import Box
+from .double import Double
 from .linear import Linear
+from .per_channel import PerChannel
+from .quadratic import Quadratic
+from .tilted import Gaussian, OrientedBox
 from .whole import Whole
 
 WHOLE, LINEAR, BOX = Whole(), Linear(), Box()
-SUPPORTS: dict[str, Support] = {s.name: s for s in (WHOLE, LINEAR, BOX)}
-BY_CODE: dict[int, Support] = {s.code: s for s in SUPPORTS.values()}
+SUPPORTS: dict[str, Support] = {
+    s.name: s for s in (WHOLE, LINEAR, BOX, Quadratic(), OrientedBox(), Gaussian(), Double())
+}
+PER_CHANNEL: dict[str, Support] = {s.name: PerChannel(s) for s in SUPPORTS.values() if s.parameters}
+BY_CODE: dict[int, Support] = {s.code: s for s in (*SUPPORTS.values(), *PER_CHANNEL.values())}
 NOTHING = 0
 
-__all__ = ["BOX", "BY_CODE", "LINEAR", "NOTHING", "SUPPORTS", "WHOLE", "Support"]
+__all__ = ["BOX", "BY_CODE", "LINEAR", "NOTHING", "PER_CHANNEL", "SUPPORTS", "WHOLE", "Support"]

@@ -67,7 +67,7 @@ def _smooth(seed: int) -> Callable[[NDArray], NDArray]:
 
 
 def _texel_directions(height: int, width: int) -> NDArray:
-    """(H, W, 3) unit directions of a map's texels, from the formula in the paper's stead:
+    """(H, W, 3) unit directions of a map's texels as Cycles has them, first row up:
     u = 0.5 - atan2(y, x) / 2 pi, v = 0.5 + atan2(z, hypot(x, y)) / pi, v = 0 below."""
     u = (np.arange(width) + 0.5) / width
     v = 1 - (np.arange(height) + 0.5) / height

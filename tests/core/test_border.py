@@ -66,6 +66,7 @@ def test_the_root_package_imports_where_there_is_no_bpy() -> None:
     # None in sys.modules makes `import bpy` fail, as where Blender is not installed
     code = (
         "import sys; sys.modules['bpy'] = None; import arto; "
-        "print(callable(arto.register), callable(arto.unregister), 'arto.arto_addon' in sys.modules)"
+        "print(callable(arto.register), callable(arto.unregister)); "
+        "print('arto.arto_addon' in sys.modules)"
     )
-    assert in_new_process(code) == "True True False"
+    assert in_new_process(code) == "True True\nFalse"

@@ -112,7 +112,6 @@ def test_solid_angles_are_the_integral_of_the_directions(rotation) -> None:
 
 
 def test_corner_patches_are_smaller_than_middle_ones() -> None:
-    """The paper's 4x4: the density of solid angle varies 2.8 times over a corner patch."""
     grid = Hemicube(faces=("top",)).solid_angles.reshape(4, 4)
     np.testing.assert_allclose(grid, grid.T)
     np.testing.assert_allclose(grid, grid[::-1, ::-1])

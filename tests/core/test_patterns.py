@@ -157,7 +157,9 @@ def test_a_set_that_cannot_tell_says_what_to_do() -> None:
         pattern_set("paper").require((ONE, U, UU, V, VV), "the box")
     says = str(e.value)
     assert "the box needs the moments u2, v2" in says and "'paper' cannot tell" in says
-    assert "Capture with the pattern set 'moments'" in says
+    assert "Capture with the pattern set 'moments' or 'moments_uv', or choose" in says
+    with pytest.raises(PatternError, match="the pattern set 'moments_uv', or choose another"):
+        pattern_set("moments").require((ONE, UU, UV), "a tilted box")
     pattern_set("moments").require((ONE, U, UU, V, VV), "the box")
 
 

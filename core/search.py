@@ -1,0 +1,122 @@
+"""The paper's Algorithm 1: a support by descent on the squared error of the patterns (paper 5).
+
+From an initial support all expansions are tried, the best is taken while it lowers the error, and
+then the step is halved, down to `finest`. What differs from the paper's text, and why:
+
+- Contractions are tried as well: a search that starts from the whole patch has nowhere to expand.
+- The patterns are polynomials, so their average over a box is known in closed form; a summed-area
+  table would be the same numbers on a grid.
+- The initial support is the previous pixel's where the coefficients are nearly equal, which forces
+  an order along a row. Rows do not depend on each other, so all rows advance together.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .patterns import PatternSet
+
+# The previous pixel's support is taken up where the coefficients differ by less than this share.
+NEARLY_EQUAL = 0.1
+# Moves of (u0, u1, v0, v1): each side out and in, and the whole box sideways.
+_MOVES = np.array(
+    [
+        (-1, 0, 0, 0), (0, 1, 0, 0), (0, 0, -1, 0), (0, 0, 0, 1),
+        (1, 0, 0, 0), (0, -1, 0, 0), (0, 0, 1, 0), (0, 0, 0, -1),
+        (1, 1, 0, 0), (-1, -1, 0, 0), (0, 0, 1, 1), (0, 0, -1, -1),
+        (-1, 1, 0, 0), (1, -1, 0, 0), (0, 0, -1, 1), (0, 0, 1, -1),
+    ],
+    np.float64,
+)  # fmt: skip
+
+
+def box_averages(boxes: NDArray) -> NDArray[np.float64]:
+    """Averages of the six monomials over boxes (u0, u1, v0, v1): (..., 4) -> (6, ...)."""
+    u0, u1, v0, v1 = np.moveaxis(boxes, -1, 0)
+    mu, mv = (u0 + u1) / 2, (v0 + v1) / 2
+    return np.stack(
+        [
+            np.ones_like(mu),
+            mu,
+            (u0 * u0 + u0 * u1 + u1 * u1) / 3,
+            mv,
+            (v0 * v0 + v0 * v1 + v1 * v1) / 3,
+            mu * mv,
+        ]
+    )
+
+
+def _error(boxes: NDArray, patterns: PatternSet, rr: NDArray, ri: NDArray) -> NDArray:
+    """The paper's squared error over patterns and channels, less a constant.
+
+    boxes: (m, n, 4); rr: (n,) sum of R^2; ri: (P, n) sum of R I -> (m, n).
+    """
+    averages = np.tensordot(patterns.matrix, box_averages(boxes), axes=1)
+    return np.einsum("pmn,pmn->mn", averages, averages * rr - 2 * ri[:, None])
+
+
+def descend(
+    boxes: NDArray,
+    patterns: PatternSet,
+    rr: NDArray,
+    ri: NDArray,
+    coarsest: float,
+    finest: float,
+) -> NDArray:
+    """Descend from `boxes` (n, 4) to supports of least squared error, all pixels at once."""
+    boxes = boxes.copy()
+    step = coarsest
+    while step >= finest:
+        active = np.arange(len(boxes))
+        best = _error(boxes[None], patterns, rr, ri)[0]
+        while len(active):
+            trial = np.clip(boxes[None, active] + step * _MOVES[:, None], 0, 1)
+            proper = (trial[..., 1] >= trial[..., 0]) & (trial[..., 3] >= trial[..., 2])
+            errors = _error(trial, patterns, rr[active], ri[:, active])
+            errors[~proper] = np.inf
+            choice = errors.argmin(axis=0)
+            least = errors[choice, np.arange(len(active))]
+            # a gain within rounding would go round in circles
+            better = least < best[active] - 1e-14 * rr[active]
+            moved = active[better]
+            boxes[moved] = trial[choice[better], np.flatnonzero(better)]
+            best[moved] = least[better]
+            active = moved
+        step /= 2
+    return boxes
+
+
+def search(
+    basis: NDArray,
+    patterns: PatternSet,
+    height: int,
+    finest: float = 1 / 256,
+    follow: bool = True,
+) -> NDArray[np.float64]:
+    """Algorithm 1 for one patch of a picture.
+
+    basis: (P, n, 3) of n = height x width pixels, row by row; finest: the last step, in patch
+    widths; follow: start from the previous pixel where coefficients are nearly equal (the paper's
+    rule; without it every pixel starts from the whole patch and all are searched at once).
+    -> boxes (n, 4) as u0, u1, v0, v1.
+    """
+    images = basis.astype(np.float64)
+    r = patterns.coefficient(images)
+    rr = np.square(r).sum(axis=-1)
+    ri = np.einsum("nc,pnc->pn", r, images)
+    whole = np.tile(np.array([0.0, 1.0, 0.0, 1.0]), (len(rr), 1))
+    if not follow:
+        return descend(whole, patterns, rr, ri, 0.25, finest)
+    width = len(rr) // height
+    out = whole.reshape(height, width, 4)
+    rows_rr, rows_ri = rr.reshape(height, width), ri.reshape(-1, height, width)
+    size = r.sum(axis=-1).reshape(height, width)
+    for x in range(width):
+        start = out[:, x].copy()
+        coarsest = 0.25
+        if x:
+            near = np.abs(size[:, x] - size[:, x - 1]) <= NEARLY_EQUAL * size[:, x - 1]
+            start[near] = out[near, x - 1]
+        out[:, x] = descend(start, patterns, rows_rr[:, x], rows_ri[:, :, x], coarsest, finest)
+    return out.reshape(-1, 4)

@@ -1,0 +1,371 @@
+"""The field on disk: precision, whole or not at all, and what a reader refuses."""
+
+from __future__ import annotations
+
+import errno
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from arto.core import fit
+from arto.core.capture_set import CaptureSet
+from arto.core.choice import DROPPED
+from arto.core.errors import CaptureSetError, FieldError, PatternError
+from arto.core.field import HEADER, VERSION, Field, FieldWriter, Region, TileWriter
+from arto.core.hemicube import Hemicube
+from arto.core.relight import relight
+from arto.core.supports import BOX, LINEAR, NOTHING, WHOLE
+
+CUBE = Hemicube(faces=("top", "back"), patches=2)
+
+
+@pytest.fixture
+def capture(tmp_path: Path, scene, write_scene) -> Path:
+    return write_scene(tmp_path / "capture", scene(CUBE))
+
+
+def entries_of(field: Field, k: int) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """Pixel -> (R, parameters) of one patch of a field of one tile."""
+    _, found = list(field.tiles[0].entries())[k]
+    return {
+        int(pixel): (e.coefficient[n], e.parameters[n])
+        for e in found
+        for n, pixel in enumerate(e.pixels)
+    }
+
+
+def test_every_entry_comes_back(tmp_path: Path, capture: Path, scene, fitted) -> None:
+    made, field = scene(CUBE), fitted(capture, tmp_path / "field")
+    assert field.shape == (6, 8) and field.hemicube == CUBE
+    for k in range(len(CUBE)):
+        found = entries_of(field, k)
+        r = made.coefficient[k].reshape(-1, 3)
+        box = made.boxes[k].reshape(-1, 4)
+        assert set(found) == set(np.flatnonzero(r.any(axis=-1)).tolist())
+        for pixel, (coefficient, parameters) in found.items():
+            # half floats: 2^-11 of the value; 16-bit edges; and float32 basis images before them
+            np.testing.assert_allclose(coefficient, r[pixel], rtol=2**-11 + 1e-6)
+            np.testing.assert_allclose(parameters, box[pixel], atol=2e-5)
+
+
+def test_layers_come_back(tmp_path: Path, capture: Path, scene, fitted) -> None:
+    made, field = scene(CUBE), fitted(capture, tmp_path / "field")
+    np.testing.assert_allclose(field.layer("own"), made.own, atol=1e-5)
+    np.testing.assert_allclose(field.layer("alpha"), made.alpha, atol=2**-11)
+    assert field.tiles[0].has_layer("alpha") and not field.tiles[0].has_layer("normal")
+    with pytest.raises(FieldError, match=r"normal\.npy is missing"):
+        field.layer("normal")
+
+
+@pytest.mark.parametrize("exposure", [1e-20, 1e-6, 1.0, 1e12])
+def test_any_exposure_fits_half_floats(tmp_path: Path, exposure: float) -> None:
+    """Relative to the brightest of the patch, whatever unit a scene is in."""
+    r = np.random.default_rng(0).uniform(0.01, 1, (2, 4, 3)) * exposure
+    tile = TileWriter(Region(0, 0, 4, 1), {})
+    for k in range(2):
+        tile.add(np.full(4, WHOLE.code, np.uint8), r[k], {WHOLE.code: np.empty((4, 0))})
+    tile.write(tmp_path / "f" / "t")
+    hemicube = Hemicube(faces=("top",), patches=1)
+    writer = FieldWriter(tmp_path / "field", hemicube, (1, 4))
+    writer.head["hemicube"]["faces"] = ["top", "back"]  # two patches
+    writer.add(tile)
+    writer.close()
+    for k in range(2):
+        found = entries_of(Field(tmp_path / "field"), k)
+        got = np.stack([found[p][0] for p in range(4)])
+        np.testing.assert_allclose(got, r[k], rtol=2**-11 + 1e-6)
+
+
+def test_models_side_by_side(tmp_path: Path) -> None:
+    """Codes decide whose row is whose, patch after patch."""
+    cube = Hemicube(faces=("top",), patches=2)
+    rng = np.random.default_rng(0)
+    codes = rng.choice([NOTHING, WHOLE.code, LINEAR.code, BOX.code], (4, 12)).astype(np.uint8)
+    codes[1] = NOTHING  # a patch that no pixel sees
+    r = rng.uniform(0.1, 1, (4, 12, 3))
+    parameters = rng.uniform(0, 1, (4, 12, 4))
+    tile = TileWriter(Region(0, 0, 4, 3), {"own": np.zeros((3, 4, 3)), "alpha": np.ones((3, 4))})
+    for k in range(4):
+        used = {
+            s.code: parameters[k][codes[k] == s.code][:, : len(s.parameters)]
+            for s in (WHOLE, LINEAR, BOX)
+        }
+        tile.add(codes[k], r[k], used)
+    writer = FieldWriter(tmp_path / "field", cube, (3, 4))
+    writer.add(tile)
+    writer.close()
+    field = Field(tmp_path / "field")
+    np.testing.assert_array_equal(field.tiles[0].codes, codes)
+    for k in range(4):
+        found = entries_of(field, k)
+        assert set(found) == set(np.flatnonzero(codes[k]).tolist())
+        for pixel, (coefficient, p) in found.items():
+            np.testing.assert_allclose(coefficient, r[k, pixel], rtol=1e-3)
+            np.testing.assert_allclose(p, parameters[k, pixel][: len(p)], atol=1e-5)
+            assert len(p) == {1: 0, 2: 2, 3: 4}[codes[k, pixel]]
+    for name, code in (("nothing", 0), ("whole", 1), ("linear", 2), ("box", 3)):
+        assert field.shares()[name] == pytest.approx((codes == code).mean())
+    assert sum(field.shares().values()) == pytest.approx(1)
+    counts = [(codes == c).sum() for c in (1, 2, 3)]
+    data = counts[0] * 6 + counts[1] * (6 + 4) + counts[2] * (6 + 8) + 48 + 4 * 4
+    headers = 128 * 8  # .npy, one each
+    assert field.bytes_per_pixel() * 12 == data + headers
+
+
+def test_a_patch_that_does_not_reach_a_material_takes_no_entry(
+    tmp_path: Path, scene, write_scene, fitted
+) -> None:
+    """The left half sees the top alone, the right half the back alone."""
+    made = scene(CUBE, unlit=0)
+    basis = made.basis.copy()
+    basis[:4, :, :, 4:] = 0
+    basis[4:, :, :, :4] = 0
+    folder = write_scene(tmp_path / "half", made._replace(basis=basis))
+    for choice in ("auto", "box", "linear", "whole"):
+        field = fitted(folder, tmp_path / choice, choice)
+        codes = field.tiles[0].codes.reshape(8, 6, 8)
+        dropped = 0
+        if choice == "auto":  # drops what nobody would see
+            size = basis[:, 0].sum(axis=-1)
+            dropped = (size[(codes == NOTHING) & (size > 0)]).size
+            assert size[codes == NOTHING].sum() < DROPPED * size.sum()
+            assert dropped < 10
+        assert ((codes != NOTHING).sum() + dropped) == 8 * 48 / 2
+        assert (codes[:4, :, 4:] == NOTHING).all() and (codes[4:, :, :4] == NOTHING).all()
+        assert field.shares()["nothing"] == pytest.approx(0.5 + dropped / 8 / 48)
+        assert sum(field.tiles[0].used.values()) == (codes != NOTHING).sum()
+
+
+def test_opening_reads_no_arrays(tmp_path: Path, capture: Path, fitted, monkeypatch) -> None:
+    fitted(capture, tmp_path / "field")
+
+    def touched(*_: object, **__: object) -> None:
+        raise AssertionError("an array was read")
+
+    with monkeypatch.context() as m:
+        m.setattr(np, "load", touched)
+        m.setattr(np, "memmap", touched)
+        field = Field(tmp_path / "field")
+        assert field.shares() and field.about["choice"] == "box"
+        assert field.bytes_per_pixel() > 0
+        with pytest.raises(AssertionError):
+            field.layer("alpha")
+    assert isinstance(field.tiles[0].codes, np.memmap)
+
+
+def test_about_says_what_made_it(tmp_path: Path, scene) -> None:
+    from arto.core import capture_set
+
+    made = scene(CUBE)
+    capture_set.write(tmp_path / "c", CUBE, made.patterns, made.basis, scene="Shot 10", samples=8)
+    steps = list(fit.fit(CaptureSet(tmp_path / "c"), tmp_path / "f", "auto", machine="a farm"))
+    about = Field(tmp_path / "f").about
+    assert about["scene"] == "Shot 10" and about["samples"] == 8
+    assert about["choice"] == "auto" and about["machine"] == "a farm"
+    assert about["fit_seconds"] >= about["read_seconds"] >= 0
+    shares = [share for share, _ in steps]
+    assert shares == sorted(shares) and shares[0] == 0 and shares[-1] == 1
+    assert len(steps) == len(CUBE) + 1
+
+
+# --- whole or not at all -------------------------------------------------------------------------
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(f.relative_to(folder)): f.read_bytes() for f in folder.rglob("*") if f.is_file()}
+
+
+@pytest.mark.parametrize("steps", [0, 1, 4, 9])
+def test_a_fit_that_is_stopped_keeps_the_old_field(
+    tmp_path: Path, capture: Path, fitted, steps: int
+) -> None:
+    fitted(capture, tmp_path / "field", "whole")
+    before = contents(tmp_path / "field")
+    job = fit.fit(CaptureSet(capture), tmp_path / "field", "box")
+    for _ in range(steps):
+        next(job)
+    job.close()
+    assert contents(tmp_path / "field") == before
+    assert {f.name for f in tmp_path.iterdir()} == {"capture", "field"}
+    # and run to its end it is replaced
+    assert fitted(capture, tmp_path / "field", "box").about["choice"] == "box"
+    assert {f.name for f in tmp_path.iterdir()} == {"capture", "field"}
+
+
+def test_a_stopped_first_fit_leaves_nothing(tmp_path: Path, capture: Path) -> None:
+    job = fit.fit(CaptureSet(capture), tmp_path / "field")
+    next(job), next(job)
+    assert not (tmp_path / "field").exists()
+    job.close()
+    assert {f.name for f in tmp_path.iterdir()} == {"capture"}
+    with pytest.raises(FieldError, match="run Fit first"):
+        Field(tmp_path / "field")
+
+
+def test_a_capture_that_breaks_on_the_way_keeps_the_old_field(
+    tmp_path: Path, scene, write_scene, fitted
+) -> None:
+    regions = [Region(0, 0, 8, 3), Region(0, 3, 8, 3)]
+    folder = write_scene(tmp_path / "c", scene(CUBE), regions)
+    fitted(folder, tmp_path / "field")
+    before = contents(tmp_path / "field")
+    (folder / "tile_0001.exr").unlink()
+    with pytest.raises(CaptureSetError, match=r"tile_0001\.exr"):
+        fitted(folder, tmp_path / "field")
+    assert contents(tmp_path / "field") == before
+    assert not (tmp_path / "field.part").exists()
+
+
+def test_what_a_crash_left_behind_does_no_harm(tmp_path: Path, capture: Path, fitted) -> None:
+    for name in ("field.part", "field.old"):
+        (tmp_path / name / "tile_0000").mkdir(parents=True)
+        (tmp_path / name / "tile_0000" / "codes.npy").write_text("half of it")
+    fitted(capture, tmp_path / "field")
+    assert {f.name for f in tmp_path.iterdir()} == {"capture", "field"}
+
+
+def test_a_choice_that_the_patterns_cannot_tell_starts_nothing(
+    tmp_path: Path, scene, write_scene
+) -> None:
+    folder = write_scene(tmp_path / "c", scene(CUBE, patterns="paper"))
+    for choice, error in (("box", PatternError), ("auto", PatternError), ("gauss", FieldError)):
+        with pytest.raises(error):
+            next(fit.fit(CaptureSet(folder), tmp_path / "field", choice))
+    assert {f.name for f in tmp_path.iterdir()} == {"c"}
+
+
+def test_a_full_disk_keeps_the_old_field(
+    tiny_disk: Path, tmp_path: Path, capture: Path, scene, write_scene, fitted
+) -> None:
+    fitted(capture, tiny_disk / "field")
+    before = contents(tiny_disk / "field")
+    large = write_scene(tmp_path / "large", scene(CUBE, (80, 80)))
+    with pytest.raises(FieldError, match=r"field cannot be written .* make room on the disk"):
+        fitted(large, tiny_disk / "field")
+    assert contents(tiny_disk / "field") == before
+    assert {f.name for f in tiny_disk.iterdir()} == {"field"}
+
+
+@pytest.mark.parametrize("name", ["codes", "alpha", "box_parameters"])
+def test_a_write_that_fails_keeps_the_old_field(
+    tmp_path: Path, capture: Path, fitted, monkeypatch, name: str
+) -> None:
+    fitted(capture, tmp_path / "field")
+    before = contents(tmp_path / "field")
+    save: Callable = np.save
+
+    def failing(path: Path, array: np.ndarray) -> None:
+        if path.stem == name:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        save(path, array)
+
+    monkeypatch.setattr(np, "save", failing)
+    with pytest.raises(FieldError, match=r"No space left on device.*make room"):
+        fitted(capture, tmp_path / "field")
+    assert contents(tmp_path / "field") == before
+    assert {f.name for f in tmp_path.iterdir()} == {"capture", "field"}
+
+
+def test_a_folder_that_cannot_be_written(read_only: Path, capture: Path) -> None:
+    with pytest.raises(FieldError, match=r"cannot be written .* choose a folder that can"):
+        next(fit.fit(CaptureSet(capture), read_only / "field"))
+
+
+# --- what is refused -----------------------------------------------------------------------------
+
+
+@pytest.fixture
+def field_folder(tmp_path: Path, capture: Path, fitted) -> Path:
+    fitted(capture, tmp_path / "field")
+    shutil.rmtree(capture)
+    return tmp_path / "field"
+
+
+def refused(folder: Path, *says: str) -> None:
+    """Opening or using the field fails with a message that holds `says` and advice."""
+    with pytest.raises(FieldError) as e:
+        use(folder)
+    for text in says:
+        assert text in str(e.value), (text, str(e.value))
+    assert "fit again" in str(e.value)
+
+
+def use(folder: Path) -> None:
+    from arto.core.environment import Environment
+    from arto.core.light import PatchLight
+
+    field = Field(folder)
+    relight(field, PatchLight(Environment.uniform(1.0, 16), field.hemicube))
+
+
+def test_another_version(field_folder: Path) -> None:
+    head = json.loads((field_folder / HEADER).read_text())
+    for version in (VERSION + 1, VERSION - 1, "1", None):
+        (field_folder / HEADER).write_text(json.dumps(head | {"version": version}))
+        refused(field_folder, f"version {version}; this ARTO reads version {VERSION}")
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "null", "{}", "3"])
+def test_a_damaged_header(field_folder: Path, text: str) -> None:
+    (field_folder / HEADER).write_text(text)
+    refused(field_folder, HEADER)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("hemicube", {}),
+        ("hemicube", None),
+        ("height", "x"),
+        ("tiles", [{}]),
+        ("tiles", [{"folder": "tile_0000", "region": [0, 0], "entries": {}}]),
+    ],
+)
+def test_a_header_that_lacks_something(field_folder: Path, key: str, value: object) -> None:
+    head = json.loads((field_folder / HEADER).read_text())
+    (field_folder / HEADER).write_text(json.dumps(head | {key: value}))
+    refused(field_folder, HEADER)
+
+
+ARRAYS = ["codes", "scales", "box_coefficient", "box_parameters", "own", "alpha"]
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_a_missing_or_damaged_array(field_folder: Path, name: str) -> None:
+    path = field_folder / "tile_0000" / f"{name}.npy"
+    whole = path.read_bytes()
+    use(field_folder)
+    for content in (whole[:-1], whole[:140], whole[:60], b"", b"no array at all, but some text"):
+        path.write_bytes(content)
+        refused(field_folder, f"{name}.npy", "missing or damaged")
+    path.unlink()
+    refused(field_folder, f"{name}.npy", "missing or damaged")
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_an_array_of_another_shape(field_folder: Path, name: str) -> None:
+    path = field_folder / "tile_0000" / f"{name}.npy"
+    np.save(path, np.load(path)[:-1])
+    refused(field_folder, f"{name}.npy")
+
+
+def test_codes_that_do_not_fit_the_entries(field_folder: Path) -> None:
+    path = field_folder / "tile_0000" / "codes.npy"
+    np.save(path, np.full_like(np.load(path), BOX.code))
+    refused(field_folder, "damaged")
+
+
+def test_a_model_of_the_future(field_folder: Path) -> None:
+    head = json.loads((field_folder / HEADER).read_text())
+    head["tiles"][0]["entries"]["gauss"] = 3
+    (field_folder / HEADER).write_text(json.dumps(head))
+    refused(field_folder, "'gauss'", "update ARTO")
+
+
+def test_a_field_without_tiles_has_no_layers(tmp_path: Path) -> None:
+    FieldWriter(tmp_path / "field", CUBE, (2, 2)).close()
+    with pytest.raises(FieldError, match="holds no tiles"):
+        Field(tmp_path / "field").layer("alpha")

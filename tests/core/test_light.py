@@ -1,0 +1,390 @@
+"""Light on the patches: averages over boxes, energy, cancellation, polynomials (paper 6)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from arto.core.environment import Environment
+from arto.core.hemicube import FACE_NAMES, Hemicube
+from arto.core.light import PatchLight, bin_coordinate, default_resolution
+from arto.core.patterns import ONE, UU, UV, VV, U, V, monomials
+from arto.core.supports import BOX, LINEAR, WHOLE
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+seeds = st.integers(0, 2**31)
+
+
+def random_boxes(rng: np.random.Generator, n: int, narrowest: float = 0) -> np.ndarray:
+    """(n, 4): u0, u1, v0, v1; a quarter of them pushed against a rim."""
+    size = rng.uniform(narrowest, 1, (n, 2))
+    low = rng.uniform(0, 1 - size)
+    low[: n // 8] = 0
+    low[n // 8 : n // 4] = 1 - size[n // 8 : n // 4]
+    high = np.minimum(low + size, 1)
+    return np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=-1)
+
+
+@given(
+    seed=seeds,
+    faces=st.permutations(FACE_NAMES),
+    count=st.integers(1, 6),
+    patches=st.integers(1, 16),
+    half=st.booleans(),
+    turned=st.booleans(),
+    shape=st.sampled_from([(16, 32), (32, 64), (16, 64), (32, 32), (2, 4)]),
+)
+@example(0, list(FACE_NAMES), 6, 16, False, False, (32, 64))
+@example(0, list(FACE_NAMES), 6, 1, True, False, (32, 64))
+@settings(max_examples=30)
+def test_uniform_light_is_uniform_in_every_box(
+    rotation, seed, faces, count, patches, half, turned, shape
+) -> None:
+    """Boxes thinner than a bin, at the rim and in the corner included; any map, any cube."""
+    cube = Hemicube(
+        faces=tuple(faces[:count]),
+        patches=patches,
+        half_sides=half,
+        **({"orientation": rotation(seed)} if turned else {}),
+    )
+    colour = np.array([0.25, 3.0, 700.0])
+    light = PatchLight(Environment(np.tile(colour.astype(np.float32), (*shape, 1))), cube)
+    rng = np.random.default_rng(seed)
+    corners = np.array([[a, a, b, b] for a in (0.0, 1.0) for b in (0.0, 1.0)])
+    for k in rng.permutation(len(cube))[:12]:
+        box = np.concatenate([random_boxes(rng, 16), corners, [[0, 1, 0, 1]]])
+        found = BOX.average(light, int(k), box)
+        np.testing.assert_allclose(found, np.broadcast_to(colour, found.shape), rtol=1e-9)
+        np.testing.assert_allclose(
+            LINEAR.average(light, int(k), rng.random((5, 2))), np.tile(colour, (5, 1)), rtol=1e-5
+        )
+    np.testing.assert_allclose(light.whole, np.tile(colour, (len(cube), 1)), rtol=1e-12)
+
+
+@pytest.mark.parametrize("patches", [8, 16])
+def test_no_corner_of_a_fine_cube_is_without_light(noisy, patches: int) -> None:
+    """Bins at the cube's corners are narrow: one that no sample met must not divide by nothing,
+    and must show what the map holds there."""
+    cube, e = Hemicube(patches=patches), noisy(4, 32)
+    light = PatchLight(e, cube)
+    k = np.arange(len(cube))
+    for corner in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)):
+        u, v = (np.full(len(cube), t) for t in corner)
+        found = light.box(k, u, u, v, v)
+        assert (found >= e.image.min() * 0.999).all() and (found <= e.image.max() * 1.001).all()
+    # and it takes next to nothing from the energy of the others
+    total = light.binned.sum(axis=(0, 1, 2))
+    np.testing.assert_allclose(total[:3], e.irradiance(), rtol=2e-6)
+    assert total[3] == pytest.approx(4 * np.pi, rel=2e-6)
+
+
+@pytest.mark.parametrize("turned", [0, 1, 2])
+@pytest.mark.parametrize("patches", [1, 2, 4, 8])
+def test_flux_is_kept(rotation, noisy, patches: int, turned: int) -> None:
+    """The patches' averages times their solid angles are the integral of the map."""
+    turn = {"orientation": rotation(turned)} if turned else {}
+    cube, e = Hemicube(patches=patches, **turn), noisy(turned, 128)
+    flux = cube.solid_angles @ PatchLight(e, cube).whole
+    np.testing.assert_allclose(flux, e.irradiance(), rtol=1e-3)
+
+
+def test_directions_without_a_patch_give_no_light(noisy) -> None:
+    e = noisy(0, 64)
+    whole = PatchLight(e, Hemicube())
+    some = PatchLight(e, Hemicube(faces=("back", "top"), half_sides=True))
+    cube = whole.hemicube
+    np.testing.assert_allclose(some.whole[-16:], whole.whole[cube.face_slice("top")], rtol=1e-12)
+    upper = whole.whole[cube.face_slice("back")][8:]
+    np.testing.assert_allclose(some.whole[:8], upper, rtol=0.01)
+    assert some.binned[..., 3].sum() == pytest.approx(4 * np.pi / 6 * 1.5, rel=1e-3)
+
+
+def sun_at(direction: np.ndarray, texels: np.ndarray, radiance: float) -> Environment:
+    """A disc of half a degree on black, each texel with the share of it that the disc covers."""
+    height, width = texels.shape[:2]
+    image = np.zeros((height, width, 3), np.float32)
+    near = np.argwhere(texels @ direction > np.cos(np.radians(0.8)))
+    t = (np.arange(32) + 0.5) / 32
+    for row, column in near:
+        latitude = np.pi / 2 - np.pi * (row + t[:, None]) / height
+        azimuth = (0.5 - (column + t) / width) * 2 * np.pi
+        d = np.stack(
+            np.broadcast_arrays(
+                np.cos(latitude) * np.cos(azimuth),
+                np.cos(latitude) * np.sin(azimuth),
+                np.sin(latitude),
+            ),
+            axis=-1,
+        )
+        angle = np.degrees(np.arccos(np.minimum(d @ direction, 1)))
+        # a rim of a twentieth of a degree, so that 32 points a side are enough
+        covered = np.clip((0.25 - angle) / 0.05 + 0.5, 0, 1).mean(axis=1)
+        share = np.cos(latitude[:, 0]) / np.cos(latitude).sum()
+        image[row, column] = radiance * (covered @ share)
+    return Environment(image)
+
+
+def test_a_sun_of_half_a_degree_keeps_its_energy(rotation, texel_directions) -> None:
+    """Anywhere: on the border of patches, of faces, at a corner of the cube, at the poles."""
+    cube = Hemicube(orientation=rotation(7))
+    rng = np.random.default_rng(0)
+    places = [*rng.normal(size=(6, 3)), np.array([0, 0, 1.0]), np.array([1e-4, 0, -1.0])]
+    for _ in range(4):
+        k, t = int(rng.integers(len(cube))), rng.random()
+        places += [cube.directions(k, 0, t), cube.directions(k, t, 1), cube.directions(k, 1, 1)]
+    places.append(cube.directions(0, 0, 0))
+    texels = texel_directions(512, 1024)
+    for place in places:
+        sun = sun_at(place / np.linalg.norm(place), texels, 1e5)
+        # what such a disc gives: 2 pi (1 - cos) of its radius
+        energy = 1e5 * 2 * np.pi * (1 - np.cos(np.radians(0.25)))
+        np.testing.assert_allclose(sun.irradiance(), energy, rtol=0.01)
+        light = PatchLight(sun, cube)
+        np.testing.assert_allclose(cube.solid_angles @ light.whole, sun.irradiance(), rtol=0.01)
+        # and it stands where it should: in the box of two degrees around its place
+        k, u, v = (x[0] for x in cube.locate(place[None]))
+        x = cube.extents[k]
+        reach = np.radians(1.5) * 2 / (x[1] - x[0])
+        box = np.clip([[u - reach, u + reach, v - reach, v + reach]], 0, 1)
+        inside = BOX.average(light, int(k), box)[0, 0]
+        lit = light.binned[k, ..., 0].sum()
+        part = box_solid_angle(cube, int(k), box[0])
+        # nothing of the patch's light lies outside; the box's own solid angle comes from samples
+        assert inside * part == pytest.approx(lit, rel=0.05)
+
+
+def box_solid_angle(cube: Hemicube, k: int, box: np.ndarray, n: int = 64) -> float:
+    x0, x1, y0, y1 = cube.extents[k]
+    t = (np.arange(n) + 0.5) / n
+    x = x0 + (x1 - x0) * (box[0] + (box[1] - box[0]) * t)
+    y = y0 + (y1 - y0) * (box[2] + (box[3] - box[2]) * t)
+    weight = (1 + x**2 + y[:, None] ** 2) ** -1.5
+    area = (x1 - x0) * (y1 - y0) * (box[1] - box[0]) * (box[3] - box[2])
+    return float(weight.mean() * area)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_boxes_average_by_solid_angle(rotation, smooth, texel_directions, seed: int) -> None:
+    """Against brute force: the light itself at 64 x 64 points of the box."""
+    function = smooth(seed)
+    cube = Hemicube(patches=2 + seed, orientation=rotation(seed))
+    e = Environment(function(texel_directions(256, 512)).astype(np.float32))
+    light = PatchLight(e, cube)
+    rng = np.random.default_rng(seed)
+    t = (np.arange(64) + 0.5) / 64
+    flat = []
+    for k in range(len(cube)):
+        boxes = random_boxes(rng, 8, 2.5 / light.resolution)
+        found = BOX.average(light, k, boxes)
+        for box, average in zip(boxes, found, strict=True):
+            u = (box[0] + (box[1] - box[0]) * t)[None, :]
+            v = (box[2] + (box[3] - box[2]) * t)[:, None]
+            values = function(cube.directions(k, *np.broadcast_arrays(u, v)))
+            x0, x1, y0, y1 = cube.extents[k]
+            weight = (1 + (x0 + (x1 - x0) * u) ** 2 + (y0 + (y1 - y0) * v) ** 2) ** -1.5
+            truth = np.einsum("ij,ijc->c", weight, values) / weight.sum()
+            np.testing.assert_allclose(average, truth, rtol=2e-3)
+            flat.append(np.abs(values.mean(axis=(0, 1)) / truth - 1).max())
+    # the check means something: an average by area would be off
+    assert max(flat) > 5e-3
+
+
+def test_whole_is_the_box_of_the_whole_patch(noisy) -> None:
+    light = PatchLight(noisy(1), Hemicube())
+    for k in (0, 50, 95):
+        box = BOX.average(light, k, np.array([[0.0, 1, 0, 1]]))
+        np.testing.assert_allclose(box[0], light.whole[k], rtol=1e-12)
+        np.testing.assert_allclose(WHOLE.average(light, k, np.empty((3, 0))), light.whole[[k] * 3])
+
+
+def test_boxes_of_many_patches_at_once(noisy) -> None:
+    light = PatchLight(noisy(2), Hemicube())
+    rng = np.random.default_rng(0)
+    k, boxes = rng.integers(0, 96, 40), random_boxes(rng, 40)
+    together = light.box(k, *boxes.T)
+    for n in range(40):
+        np.testing.assert_allclose(together[n], light.box(int(k[n]), *boxes[n : n + 1].T)[0])
+
+
+def test_halves_make_the_whole(noisy) -> None:
+    """Averages weighted by solid angle add up, wherever a box is cut."""
+    light = PatchLight(noisy(5), Hemicube(), resolution=16)
+    rng = np.random.default_rng(3)
+    for k in range(0, 96, 7):
+        u0, u1, v0, v1 = 0.05, 0.95, 0.1, 0.8
+        cut = rng.uniform(0.3, 0.7)
+
+        def both(*box: float, k: int = k) -> np.ndarray:
+            i0, i1 = (bin_coordinate(light.hemicube, k, np.array([t]), 0, 16) for t in box[:2])
+            j0, j1 = (bin_coordinate(light.hemicube, k, np.array([t]), 1, 16) for t in box[2:])
+            s = light._sum_to
+            weight = (s(k, i1, j1) - s(k, i0, j1) - s(k, i1, j0) + s(k, i0, j0))[0, 3]
+            average = light.box(k, *(np.array([t]) for t in box))[0]
+            return np.append(average * weight, weight)
+
+        parts = both(u0, cut, v0, v1) + both(cut, u1, v0, v1)
+        np.testing.assert_allclose(parts, both(u0, u1, v0, v1), rtol=1e-10)
+
+
+def test_darkness_beside_a_sun_stays_dark() -> None:
+    """Four corners of a table that holds 1e6 and 1: float64, or nothing is left of the 1."""
+    cube = Hemicube(faces=("back",))
+    image = np.ones((64, 128, 3), np.float32)
+    k, (u, v) = 5, (0.4, 0.6)
+    d = cube.directions(k, u, v)
+    row = int((0.5 - np.arcsin(d[2]) / np.pi) * 64)
+    column = int((0.5 - np.arctan2(d[1], d[0]) / (2 * np.pi)) * 128)
+    image[row, column] = 1e6
+    light = PatchLight(Environment(image), cube)
+    r = light.resolution
+    radiance = light.binned[k, ..., 0] / light.binned[k, ..., 3]
+    i = np.nonzero(radiance > 1.0001)[1]
+    assert len(i) and radiance.max() > 1e5
+    x = cube.extents[k]
+    start, stop = np.arctan(x[:2])
+
+    def coordinate(b: float) -> np.ndarray:  # of a bin edge
+        return np.array([(np.tan(start + (stop - start) * b / r) - x[0]) / (x[1] - x[0])])
+
+    a = 1e-9  # of a bin beside the sun's: as good as touching it
+    left = light.box(k, coordinate(0), coordinate(i.min() - a), np.zeros(1), np.ones(1))
+    right = light.box(k, coordinate(i.max() + 1 + a), coordinate(r), np.zeros(1), np.ones(1))
+    thin = light.box(
+        k, coordinate(i.max() + 1 + a), coordinate(i.max() + 2 + a), np.zeros(1), np.ones(1)
+    )
+    for dark in (left, right, thin):
+        np.testing.assert_allclose(dark, 1, rtol=1e-6)
+    over = light.box(k, coordinate(i.max() + 0.9), coordinate(r), np.zeros(1), np.ones(1))
+    assert over.min() > 100
+
+
+@pytest.mark.parametrize("which", [(ONE,), (ONE, U, V), (ONE, U, UU, V, VV), (*range(6),)])
+def test_polynomial_light_is_met_exactly(which: tuple[int, ...]) -> None:
+    cube = Hemicube(patches=3, half_sides=True)
+    light = PatchLight(Environment.uniform(1.0, 32), cube)
+    truth = np.random.default_rng(0).normal(size=(len(cube), len(which), 3))
+    for k in range(len(cube)):
+        u, v = light.bin_centres(k)
+        basis = monomials(u[None, :], v[:, None])[list(which)]
+        radiance = np.einsum("mji,mc->jic", basis, truth[k])
+        light.binned[k, ..., :3] = radiance * light.binned[k, ..., 3:]
+    np.testing.assert_allclose(light.polynomial(which), truth, atol=1e-8)
+
+
+def test_a_map_that_is_a_plane_over_each_patch(texel_directions) -> None:
+    """Through the map, to within its texels; and the plane at the mean place is the pixel. One
+    plane a face, seen by the patches in the middle: no texel of another face reaches them."""
+    faces, cube = Hemicube(patches=1), Hemicube(patches=4)
+    rng = np.random.default_rng(1)
+    truth = rng.uniform(0.2, 1, (6, 3, 3))
+
+    def plane(face: np.ndarray | int, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        t = truth[face]
+        return t[..., 0, :] + u[..., None] * t[..., 1, :] + v[..., None] * t[..., 2, :]
+
+    image = plane(*faces.locate(texel_directions(256, 512)))
+    light = PatchLight(Environment(image.astype(np.float32)), cube)
+    found = light.polynomial((ONE, U, V))
+    mean = rng.random((20, 2))
+    for k, (name, row, column) in enumerate(cube.grid):
+        if not {row, column} <= {1, 2}:
+            continue
+        face = FACE_NAMES.index(name)
+        here = np.array([plane(face, np.array(column / 4), np.array(row / 4))])
+        np.testing.assert_allclose(found[k, :1], here, rtol=3e-3)
+        np.testing.assert_allclose(found[k, 1:], truth[face, 1:] / 4, atol=5e-3)
+        u, v = (column + mean[:, 0]) / 4, (row + mean[:, 1]) / 4
+        np.testing.assert_allclose(LINEAR.average(light, k, mean), plane(face, u, v), rtol=3e-3)
+
+
+def test_the_projection_is_the_nearest_by_solid_angle(noisy) -> None:
+    """What is left over is orthogonal to 1, u and v under the weight of solid angle."""
+    light = PatchLight(noisy(9), Hemicube())
+    found = light.polynomial((ONE, U, V))
+    for k in range(0, 96, 11):
+        u, v = light.bin_centres(k)
+        m = monomials(u[None, :], v[:, None])[[ONE, U, V]]
+        left = light.binned[k, ..., :3] - np.einsum(
+            "mji,mc,ji->jic", m, found[k], light.binned[k, ..., 3]
+        )
+        size = np.abs(light.binned[k, ..., :3]).sum()
+        np.testing.assert_allclose(np.einsum("mji,jic->mc", m, left) / size, 0, atol=1e-12)
+
+
+def test_bins_lie_where_their_centres_say() -> None:
+    cube = Hemicube(patches=3, half_sides=True)
+    light = PatchLight(Environment.uniform(), cube, resolution=7)
+    for k in range(len(cube)):
+        u, v = light.bin_centres(k)
+        for axis, t in enumerate((u, v)):
+            np.testing.assert_allclose(
+                bin_coordinate(cube, k, t, axis, 7), np.arange(7) + 0.5, atol=1e-12
+            )
+        # equal in angle: steps between neighbours' directions along the face's middle line
+        x = cube.extents[k]
+        angle = np.arctan(x[0] + (x[1] - x[0]) * u)
+        np.testing.assert_allclose(np.diff(angle), np.diff(angle)[0])
+
+
+@pytest.mark.parametrize("texels", [1, 16, 37])
+def test_turning_cube_and_world_together_changes_nothing(noisy, texels: int) -> None:
+    """About z by whole texels: counter-clockwise from above is to the left in the map."""
+    e = noisy(3, 64)
+    a = 2 * np.pi * texels / 128
+    turn = ((np.cos(a), -np.sin(a), 0.0), (np.sin(a), np.cos(a), 0.0), (0.0, 0.0, 1.0))
+    still = PatchLight(e, Hemicube())
+    turned = PatchLight(Environment(np.roll(e.image, -texels, axis=1)), Hemicube(orientation=turn))
+    assert np.abs(still.whole / PatchLight(e, Hemicube(orientation=turn)).whole - 1).max() > 0.01
+    np.testing.assert_allclose(turned.whole, still.whole, rtol=1e-9)
+    boxes = random_boxes(np.random.default_rng(0), 30)
+    for k in range(0, 96, 5):
+        np.testing.assert_allclose(turned.box(k, *boxes.T), still.box(k, *boxes.T), rtol=1e-9)
+    np.testing.assert_allclose(
+        turned.polynomial((ONE, U, V)), still.polynomial((ONE, U, V)), atol=1e-9
+    )
+
+
+def test_light_is_linear_in_the_world(noisy) -> None:
+    cube, a, b = Hemicube(patches=2), noisy(1), noisy(2)
+    both = PatchLight(Environment(2 * a.image + 0.5 * b.image), cube)
+    la, lb = PatchLight(a, cube), PatchLight(b, cube)
+    np.testing.assert_allclose(both.whole, 2 * la.whole + 0.5 * lb.whole, rtol=1e-6)
+    boxes = random_boxes(np.random.default_rng(0), 30)
+    np.testing.assert_allclose(
+        both.box(3, *boxes.T), 2 * la.box(3, *boxes.T) + 0.5 * lb.box(3, *boxes.T), rtol=1e-5
+    )
+    which = (ONE, U, UU, V, VV, UV)
+    np.testing.assert_allclose(
+        both.polynomial(which), 2 * la.polynomial(which) + 0.5 * lb.polynomial(which), atol=1e-4
+    )
+
+
+def test_a_map_of_another_size_or_cube_is_not_mistaken(noisy, monkeypatch) -> None:
+    """The samples' bins are kept between maps of one size; those of another must not be used."""
+    cubes = [Hemicube(patches=2), Hemicube(patches=2, half_sides=True), Hemicube(patches=3)]
+    maps = [noisy(0, 16), noisy(1, 16), noisy(2, 32), Environment(noisy(2, 32).image[::2])]
+    found = [[PatchLight(e, cube, r).binned for r in (4, 8)] for cube in cubes for e in maps]
+    again = iter(found)
+    for cube in cubes:
+        for e in maps:
+            for binned, r in zip(next(again), (4, 8), strict=True):
+                monkeypatch.setattr("arto.core.light._CACHE", {})
+                np.testing.assert_array_equal(binned, PatchLight(e, cube, r).binned)
+
+
+def test_a_thin_box_at_the_rim_sees_the_bin_there(noisy) -> None:
+    """Widened to one bin, inwards."""
+    cube = Hemicube(patches=2)
+    light = PatchLight(noisy(3), cube)
+    k = np.arange(len(cube))
+    radiance = light.binned[..., :3] / light.binned[..., 3:]
+    for u, i in ((0.0, 0), (1.0, -1)):
+        for v, j in ((0.0, 0), (1.0, -1)):
+            us, vs = np.full(len(cube), u), np.full(len(cube), v)
+            found = light.box(k, us, us, vs, vs)
+            np.testing.assert_allclose(found, radiance[:, j, i], rtol=1e-9)
+
+
+def test_default_resolution_is_about_a_texel_a_bin() -> None:
+    assert default_resolution(Hemicube(patches=4), Environment.uniform(1, 512)) == 64
+    assert default_resolution(Hemicube(patches=16), Environment.uniform(1, 8)) == 4
