@@ -32,6 +32,28 @@ def _stability(options: argparse.Namespace) -> None:
     print(table(rows))
 
 
+def _models(options: argparse.Namespace) -> None:
+    from . import scenes
+    from .models import models, table
+
+    rows = models(
+        options.json,
+        options.scenes or list(scenes.SCENES),
+        options.hdris or scenes.hdri_names(),
+        (options.width, options.width * 3 // 4),
+        options.samples,
+        options.many,
+    )
+    print(table(rows))
+
+
+def _figure3(options: argparse.Namespace) -> None:
+    from .figure3 import figure3
+
+    figure3(options.out, (options.width, options.width * 3 // 4), options.samples)
+    print(f"look at {options.out}")
+
+
 def _patterns(options: argparse.Namespace) -> None:
     from arto.core.patterns import MONOMIALS, PATTERN_SETS
 
@@ -58,6 +80,21 @@ def main() -> int:
     c = commands.add_parser("stability", help="hard synthetic cases for every support model")
     c.add_argument("--json", type=Path, default=Path("out/stability.json"))
     c.set_defaults(run=_stability)
+
+    c = commands.add_parser("models", help="every support model on the same captures")
+    c.add_argument("--json", type=Path, default=Path("out/models.json"))
+    c.add_argument("--scenes", nargs="+")
+    c.add_argument("--hdris", nargs="+")
+    c.add_argument("--width", type=int, default=48)
+    c.add_argument("--samples", type=int, default=16384)
+    c.add_argument("--many", type=int, default=8192, help="samples of each of two references")
+    c.set_defaults(run=_models)
+
+    c = commands.add_parser("figure3", help="the paper's figure 3: supports of four pixels")
+    c.add_argument("--out", type=Path, default=Path("docs/figure3.png"))
+    c.add_argument("--width", type=int, default=80)
+    c.add_argument("--samples", type=int, default=2048)
+    c.set_defaults(run=_figure3)
 
     c = commands.add_parser("patterns", help="what each set of patterns can identify")
     c.set_defaults(run=_patterns)

@@ -18,8 +18,10 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
 
+import bpy  # first: bmesh is only there once it is
+
+# isort: split
 import bmesh
-import bpy
 import numpy as np
 from mathutils import Euler, Matrix, Vector
 

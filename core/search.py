@@ -19,6 +19,7 @@ from .patterns import PatternSet
 
 # The previous pixel's support is taken up where the coefficients differ by less than this share.
 NEARLY_EQUAL = 0.1
+COARSEST = 0.25
 # Moves of (u0, u1, v0, v1): each side out and in, and the whole box sideways.
 _MOVES = np.array(
     [
@@ -47,20 +48,21 @@ def box_averages(boxes: NDArray) -> NDArray[np.float64]:
     )
 
 
-def _error(boxes: NDArray, patterns: PatternSet, rr: NDArray, ri: NDArray) -> NDArray:
-    """The paper's squared error over patterns and channels, less a constant.
+def _error(boxes: NDArray, patterns: PatternSet, target: NDArray) -> NDArray:
+    """The paper's squared error over patterns and channels, over sum R^2 and less a constant.
 
-    boxes: (m, n, 4); rr: (n,) sum of R^2; ri: (P, n) sum of R I -> (m, n).
+    With one support for all channels, sum_c (R_c a - I_c)^2 is sum_c R_c^2 times (a - t)^2 and what
+    no support can mend, with the target t = sum R I / sum R^2: written so, nothing cancels.
+    boxes: (m, n, 4); target: (P, n) -> (m, n).
     """
     averages = np.tensordot(patterns.matrix, box_averages(boxes), axes=1)
-    return np.einsum("pmn,pmn->mn", averages, averages * rr - 2 * ri[:, None])
+    return np.square(averages - target[:, None]).sum(axis=0)
 
 
 def descend(
     boxes: NDArray,
     patterns: PatternSet,
-    rr: NDArray,
-    ri: NDArray,
+    target: NDArray,
     coarsest: float,
     finest: float,
 ) -> NDArray:
@@ -69,16 +71,15 @@ def descend(
     step = coarsest
     while step >= finest:
         active = np.arange(len(boxes))
-        best = _error(boxes[None], patterns, rr, ri)[0]
+        best = _error(boxes[None], patterns, target)[0]
         while len(active):
             trial = np.clip(boxes[None, active] + step * _MOVES[:, None], 0, 1)
             proper = (trial[..., 1] >= trial[..., 0]) & (trial[..., 3] >= trial[..., 2])
-            errors = _error(trial, patterns, rr[active], ri[:, active])
+            errors = _error(trial, patterns, target[:, active])
             errors[~proper] = np.inf
             choice = errors.argmin(axis=0)
             least = errors[choice, np.arange(len(active))]
-            # a gain within rounding would go round in circles
-            better = least < best[active] - 1e-14 * rr[active]
+            better = least < best[active]
             moved = active[better]
             boxes[moved] = trial[choice[better], np.flatnonzero(better)]
             best[moved] = least[better]
@@ -104,19 +105,18 @@ def search(
     images = basis.astype(np.float64)
     r = patterns.coefficient(images)
     rr = np.square(r).sum(axis=-1)
-    ri = np.einsum("nc,pnc->pn", r, images)
+    target = np.einsum("nc,pnc->pn", r, images) / np.where(rr > 0, rr, 1)
     whole = np.tile(np.array([0.0, 1.0, 0.0, 1.0]), (len(rr), 1))
     if not follow:
-        return descend(whole, patterns, rr, ri, 0.25, finest)
+        return descend(whole, patterns, target, COARSEST, finest)
     width = len(rr) // height
     out = whole.reshape(height, width, 4)
-    rows_rr, rows_ri = rr.reshape(height, width), ri.reshape(-1, height, width)
+    targets = target.reshape(-1, height, width)
     size = r.sum(axis=-1).reshape(height, width)
     for x in range(width):
         start = out[:, x].copy()
-        coarsest = 0.25
         if x:
             near = np.abs(size[:, x] - size[:, x - 1]) <= NEARLY_EQUAL * size[:, x - 1]
             start[near] = out[near, x - 1]
-        out[:, x] = descend(start, patterns, rows_rr[:, x], rows_ri[:, :, x], coarsest, finest)
+        out[:, x] = descend(start, patterns, targets[:, :, x], COARSEST, finest)
     return out.reshape(-1, 4)

@@ -264,3 +264,31 @@ def test_files_are_ordinary(tmp_path):
     mode = (there.folder / there.files[0][0]).stat().st_mode
     assert mode & stat.S_IRUSR
     assert not list(Path(there.folder).glob("*.part"))
+
+
+def test_grain_shows_the_noise(tmp_path):
+    """The grain of one capture against the difference of two seeds: no larger than the grain says
+    (stratified samples are less noisy than independent ones, never more), and not far under it."""
+    one, two = (captured(_seeded(tmp_path / str(s), s)).read(0) for s in (1, 2))
+    white = [d.basis[:, 0].sum(axis=-1) for d in (one, two)]
+    found = [np.square(d.grain).sum(axis=(1, 2)) for d in (one, two)]
+    between = np.square(white[0] - white[1]).sum(axis=(1, 2)) / 2
+    lit = np.mean(white[0], axis=(1, 2)) > 0.01
+    assert lit.sum() >= 3
+    ratio = between[lit] / np.mean(found, axis=0)[lit]
+    assert (ratio > 0.02).all() and (ratio < 1.5).all(), ratio
+    # its sign is a coin's: the sum is no larger than its own deviation allows
+    total = one.grain[lit].sum(axis=(1, 2))
+    assert (np.abs(total) < 4 * np.sqrt(found[0][lit])).all()
+
+
+def _seeded(folder, seed):
+    scene = small_scene(folder)
+    scene.arto.seed = seed
+    return scene
+
+
+def test_grain_can_be_left_out(tmp_path):
+    scene = small_scene(tmp_path)
+    scene.arto.grain = False
+    assert captured(scene).read(0).grain is None

@@ -36,7 +36,7 @@ def random_boxes(rng: np.random.Generator, n: int, narrowest: float = 0) -> np.n
 )
 @example(0, list(FACE_NAMES), 6, 16, False, False, (32, 64))
 @example(0, list(FACE_NAMES), 6, 1, True, False, (32, 64))
-@settings(max_examples=30)
+@settings(max_examples=25)
 def test_uniform_light_is_uniform_in_every_box(
     rotation, seed, faces, count, patches, half, turned, shape
 ) -> None:
@@ -99,28 +99,26 @@ def test_directions_without_a_patch_give_no_light(noisy) -> None:
     assert some.binned[..., 3].sum() == pytest.approx(4 * np.pi / 6 * 1.5, rel=1e-3)
 
 
+RADIUS, RIM = 0.25, 0.1  # degrees
+
+
 def sun_at(direction: np.ndarray, texels: np.ndarray, radiance: float) -> Environment:
-    """A disc of half a degree on black, each texel with the share of it that the disc covers."""
+    """A disc of half a degree on black, each texel with the share of it that the disc covers.
+
+    Its rim fades over a tenth of a degree, so that 16 x 16 points of a texel are enough.
+    """
     height, width = texels.shape[:2]
     image = np.zeros((height, width, 3), np.float32)
-    near = np.argwhere(texels @ direction > np.cos(np.radians(0.8)))
-    t = (np.arange(32) + 0.5) / 32
-    for row, column in near:
-        latitude = np.pi / 2 - np.pi * (row + t[:, None]) / height
-        azimuth = (0.5 - (column + t) / width) * 2 * np.pi
-        d = np.stack(
-            np.broadcast_arrays(
-                np.cos(latitude) * np.cos(azimuth),
-                np.cos(latitude) * np.sin(azimuth),
-                np.sin(latitude),
-            ),
-            axis=-1,
-        )
-        angle = np.degrees(np.arccos(np.minimum(d @ direction, 1)))
-        # a rim of a twentieth of a degree, so that 32 points a side are enough
-        covered = np.clip((0.25 - angle) / 0.05 + 0.5, 0, 1).mean(axis=1)
-        share = np.cos(latitude[:, 0]) / np.cos(latitude).sum()
-        image[row, column] = radiance * (covered @ share)
+    row, column = np.nonzero(texels @ direction > np.cos(np.radians(0.9)))
+    t = (np.arange(16) + 0.5) / 16
+    latitude = np.pi / 2 - np.pi * (row[:, None, None] + t[:, None]) / height
+    azimuth = (0.5 - (column[:, None, None] + t) / width) * 2 * np.pi
+    cosine = np.cos(latitude) * (direction[0] * np.cos(azimuth) + direction[1] * np.sin(azimuth))
+    angle = np.degrees(np.arccos(np.minimum(cosine + np.sin(latitude) * direction[2], 1)))
+    covered = np.clip((RADIUS - angle) / RIM + 0.5, 0, 1).mean(axis=2)
+    share = np.cos(latitude[..., 0])
+    lit = (covered * share).sum(axis=1) / share.sum(axis=1)
+    image[row, column] = radiance * lit[:, None]
     return Environment(image)
 
 
@@ -128,16 +126,16 @@ def test_a_sun_of_half_a_degree_keeps_its_energy(rotation, texel_directions) -> 
     """Anywhere: on the border of patches, of faces, at a corner of the cube, at the poles."""
     cube = Hemicube(orientation=rotation(7))
     rng = np.random.default_rng(0)
-    places = [*rng.normal(size=(6, 3)), np.array([0, 0, 1.0]), np.array([1e-4, 0, -1.0])]
-    for _ in range(4):
+    places = [*rng.normal(size=(3, 3)), np.array([0, 0, 1.0]), np.array([1e-4, 0, -1.0])]
+    for _ in range(2):
         k, t = int(rng.integers(len(cube))), rng.random()
         places += [cube.directions(k, 0, t), cube.directions(k, t, 1), cube.directions(k, 1, 1)]
     places.append(cube.directions(0, 0, 0))
     texels = texel_directions(512, 1024)
     for place in places:
         sun = sun_at(place / np.linalg.norm(place), texels, 1e5)
-        # what such a disc gives: 2 pi (1 - cos) of its radius
-        energy = 1e5 * 2 * np.pi * (1 - np.cos(np.radians(0.25)))
+        # what such a disc gives: the integral over its radius, the fading rim included
+        energy = 1e5 * np.pi * np.radians(1) ** 2 * (RADIUS**2 + RIM**2 / 12)
         np.testing.assert_allclose(sun.irradiance(), energy, rtol=0.01)
         light = PatchLight(sun, cube)
         np.testing.assert_allclose(cube.solid_angles @ light.whole, sun.irradiance(), rtol=0.01)
@@ -163,7 +161,7 @@ def box_solid_angle(cube: Hemicube, k: int, box: np.ndarray, n: int = 64) -> flo
     return float(weight.mean() * area)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_boxes_average_by_solid_angle(rotation, smooth, texel_directions, seed: int) -> None:
     """Against brute force: the light itself at 64 x 64 points of the box."""
     function = smooth(seed)

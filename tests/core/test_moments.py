@@ -1,14 +1,12 @@
-"""Moments and supports: boxes that were planted come back, noise does no harm (paper 5)."""
+"""Moments: boxes that were planted come back, noise does no harm (paper 5)."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from arto.core.choice import BROAD, CHOICES, DROPPED, Evidence, check, choose, evidence
-from arto.core.errors import FieldError, PatternError
 from arto.core.moments import UNIFORM_VARIANCE, Moments
 from arto.core.patterns import UU, VV, U, V, pattern_set
-from arto.core.supports import BOX, BY_CODE, LINEAR, NOTHING, SUPPORTS, WHOLE
+from arto.core.supports import BOX, LINEAR
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -19,11 +17,6 @@ unit = st.floats(0, 1, allow_subnormal=False)
 boxes = st.lists(st.tuples(unit, unit, unit, unit), min_size=1, max_size=20).map(
     lambda rows: np.array([[*sorted(r[:2]), *sorted(r[2:])] for r in rows])
 )
-
-
-def alone(moments: Moments, samples: float | None = None) -> Evidence:
-    """What is known where this patch is the only one."""
-    return evidence(moments.coefficient[None], samples)
 
 
 @pytest.mark.parametrize("name", ["moments", "moments_uv"])
@@ -80,15 +73,11 @@ def test_two_hits_never_leave_the_patch(hits, u, v, share: float) -> None:
         assert high == pytest.approx(min(mean + half, 1), abs=1e-7)
 
 
-def test_no_light_means_the_whole_patch_and_no_entry() -> None:
+def test_no_light_means_the_whole_patch() -> None:
     moments = Moments.from_basis(np.zeros((5, 3, 3), np.float32), MOMENTS)
     np.testing.assert_allclose(moments.mean, 0.5)
     np.testing.assert_allclose(moments.variance, UNIFORM_VARIANCE)
     np.testing.assert_allclose(BOX.fit(moments), [[0, 1, 0, 1]] * 3, atol=1e-12)
-    for name in ("auto", *SUPPORTS):
-        codes, parameters = choose(name, moments, alone(moments))
-        assert (codes == NOTHING).all()
-        assert all(len(p) == 0 for p in parameters.values())
 
 
 @given(seed=seeds, few=st.integers(1, 4))
@@ -139,108 +128,3 @@ def test_the_papers_set_tells_the_mean_and_marks_the_rest(planted) -> None:
     np.testing.assert_allclose(np.ravel(moments.mean), (0.3, 0.35), atol=1e-9)
     np.testing.assert_allclose(moments.coefficient, 1, atol=1e-9)
     assert np.isnan(moments.normalised[[UU, VV]]).all()
-
-
-def test_auto_takes_the_plane_for_broad_light_and_the_box_for_narrow(planted) -> None:
-    h = BROAD
-    box = np.array(
-        [
-            [0.5 - h, 0.5 + h + 0.02, 0.5 - h - 0.01, 0.5 + h + 0.01],
-            [0.5 - h + 0.01, 0.5 + h - 0.01, 0.0, 1.0],  # narrow one way
-            [0.0, 1.0, 0.2, 0.3],
-            [0.2, 0.9, 0.1, 0.9],
-            [0.3, 0.4, 0.3, 0.4],
-        ]
-    )
-    r = np.ones((5, 3))
-    r[3] = 0  # no light
-    moments = Moments.from_basis(planted(MOMENTS, box, r), MOMENTS)
-    codes, parameters = choose("auto", moments, alone(moments))
-    assert codes.tolist() == [LINEAR.code, BOX.code, BOX.code, NOTHING, BOX.code]
-    np.testing.assert_allclose(parameters[BOX.code], box[[1, 2, 4]], atol=1e-9)
-    np.testing.assert_allclose(parameters[LINEAR.code], [[0.51, 0.5]], atol=1e-9)
-
-
-def test_a_broad_light_in_the_middle_is_the_whole_patch(planted) -> None:
-    """A plane at the middle of the patch is its mean; a box of two hits is no evidence."""
-    box = np.array([[0.0, 1.0, 0.0, 1.0], [0.7, 0.72, 0.1, 0.12]])
-    moments = Moments.from_basis(planted(MOMENTS, box, np.ones((2, 3))), MOMENTS)
-    for samples, expected in ((None, BOX), (1000, BOX), (2, WHOLE)):
-        codes = choose("auto", moments, alone(moments, samples))[0]
-        assert codes.tolist() == [WHOLE.code, expected.code]
-
-
-def test_a_quarter_of_the_samples_is_a_quarter_of_the_evidence(planted) -> None:
-    """Hits are counted by the share of the pixel's light that came from the patch."""
-    box = np.array([[0.7, 0.72, 0.1, 0.12]])
-    moments = Moments.from_basis(planted(MOMENTS, box, np.ones((1, 3))), MOMENTS)
-
-    def known(share: float) -> Evidence:
-        rest = np.full((1, 1, 3), (1 / share - 1) if share < 1 else 0)
-        return evidence(np.concatenate([moments.coefficient[None], rest]), 64)
-
-    np.testing.assert_allclose([known(s).hits(moments)[0] for s in (1, 0.25, 0.03)], [64, 16, 1.92])
-    codes = [choose("auto", moments, known(s))[0][0] for s in (1, 0.25, 0.03)]
-    assert codes == [BOX.code, BOX.code, WHOLE.code]
-
-
-@given(seed=seeds, patches=st.integers(1, 60))
-def test_what_is_dropped_stays_under_its_share(planted, seed: int, patches: int) -> None:
-    """And nothing could be dropped with it: the next larger entry would pass the share."""
-    rng = np.random.default_rng(seed)
-    r = (10 ** rng.uniform(-6, 0, (patches, 20, 3))).astype(np.float32)
-    known = evidence(r, None)
-    box = np.tile(np.array([0.1, 0.2, 0.3, 0.5]), (20, 1))
-    kept = np.stack(
-        [
-            choose(
-                "auto",
-                Moments.from_basis(planted(MOMENTS, box, c).astype(np.float32), MOMENTS),
-                known,
-            )[0]
-            != NOTHING
-            for c in r
-        ]
-    )
-    size = r.sum(axis=-1, dtype=np.float64)
-    dropped = np.where(kept, 0, size).sum(axis=0)
-    assert (dropped <= DROPPED * size.sum(axis=0)).all()
-    smallest = np.where(kept, size, np.inf).min(axis=0)
-    assert (dropped + smallest > DROPPED * size.sum(axis=0)).all()
-
-
-@pytest.mark.parametrize("name", list(SUPPORTS))
-def test_one_model_for_all_takes_every_lit_pixel(planted, name: str) -> None:
-    r = np.array([[1.0, 0, 0], [0, 0, 0], [0, 0, 1e-6]])  # one channel is enough
-    box = np.array([[0.1, 0.2, 0.3, 0.4]] * 3)
-    patterns = pattern_set("moments_uv")
-    moments = Moments.from_basis(planted(patterns, box, r), patterns)
-    codes, parameters = choose(name, moments, alone(moments))
-    support = SUPPORTS[name]
-    assert codes.tolist() == [support.code, NOTHING, support.code]
-    assert parameters[support.code].shape == (2, len(support.parameters))
-
-
-def test_codes_are_for_good() -> None:
-    """They stand in files: a number is never used for another model."""
-    codes = {s.name: s.code for s in SUPPORTS.values()}
-    assert codes.items() >= {"whole": 1, "linear": 2, "box": 3}.items()
-    for code, support in BY_CODE.items():
-        assert support.code == code and 0 < code < 256
-    assert len(BY_CODE) == len({s.name for s in BY_CODE.values()})
-    assert {WHOLE, LINEAR, BOX} <= set(BY_CODE.values()) and NOTHING not in BY_CODE
-
-
-def test_a_choice_that_cannot_be() -> None:
-    with pytest.raises(FieldError, match="no support model 'gauss': choose one of auto, whole"):
-        check("gauss", MOMENTS)
-    for choice in ("auto", "box"):
-        with pytest.raises(PatternError, match="needs the moments u2, v2"):
-            check(choice, pattern_set("paper"))
-    for choice in ("linear", "whole"):
-        check(choice, pattern_set("paper"))
-    with pytest.raises(PatternError, match="'linear' needs the moments u, v"):
-        check("linear", pattern_set("white"))
-    check("whole", pattern_set("white"))
-    for choice in CHOICES:
-        check(choice, pattern_set("moments_uv"))

@@ -1,0 +1,148 @@
+"""The choice of a support model: by evidence, within the light that may be dropped."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from arto.core.choice import BROAD, CHOICES, DROPPED, Evidence, check, choose, evidence
+from arto.core.errors import FieldError, PatternError
+from arto.core.moments import Moments
+from arto.core.patterns import pattern_set
+from arto.core.supports import BOX, BY_CODE, LINEAR, NOTHING, SUPPORTS, WHOLE
+from hypothesis import given
+from hypothesis import strategies as st
+
+MOMENTS = pattern_set("moments")
+
+
+def known(coefficients: np.ndarray, samples: float | None = None) -> Evidence:
+    """Evidence of a row of pixels, (K, n, 3)."""
+    return evidence(coefficients, (1, coefficients.shape[1]), samples)
+
+
+def alone(
+    choice: str, moments: Moments, samples: float | None = None
+) -> tuple[np.ndarray, dict[int, np.ndarray]]:
+    """The choice where this patch is the only one."""
+    return choose(choice, moments, known(moments.coefficient[None], samples), 0)
+
+
+def test_no_light_is_no_entry() -> None:
+    moments = Moments.from_basis(np.zeros((5, 3, 3), np.float32), MOMENTS)
+    for name in ("auto", *SUPPORTS):
+        codes, parameters = alone(name, moments)
+        assert (codes == NOTHING).all()
+        assert all(len(p) == 0 for p in parameters.values())
+
+
+def test_auto_takes_the_plane_for_broad_light_and_the_box_for_narrow(planted) -> None:
+    h = BROAD
+    box = np.array(
+        [
+            [0.5 - h, 0.5 + h + 0.02, 0.5 - h - 0.01, 0.5 + h + 0.01],
+            [0.5 - h + 0.01, 0.5 + h - 0.01, 0.0, 1.0],  # narrow one way
+            [0.0, 1.0, 0.2, 0.3],
+            [0.2, 0.9, 0.1, 0.9],
+            [0.3, 0.4, 0.3, 0.4],
+        ]
+    )
+    r = np.ones((5, 3))
+    r[3] = 0  # no light
+    moments = Moments.from_basis(planted(MOMENTS, box, r), MOMENTS)
+    codes, parameters = alone("auto", moments)
+    assert codes.tolist() == [LINEAR.code, BOX.code, BOX.code, NOTHING, BOX.code]
+    np.testing.assert_allclose(parameters[BOX.code], box[[1, 2, 4]], atol=1e-9)
+    np.testing.assert_allclose(parameters[LINEAR.code], [[0.51, 0.5]], atol=1e-9)
+
+
+def test_a_broad_light_in_the_middle_is_the_whole_patch(planted) -> None:
+    """A plane at the middle of the patch is its mean; a box of two hits is no evidence."""
+    box = np.array([[0.0, 1.0, 0.0, 1.0], [0.7, 0.72, 0.1, 0.12]])
+    moments = Moments.from_basis(planted(MOMENTS, box, np.ones((2, 3))), MOMENTS)
+    for samples, expected in ((None, BOX), (1000, BOX), (2, WHOLE)):
+        codes = alone("auto", moments, samples)[0]
+        assert codes.tolist() == [WHOLE.code, expected.code]
+
+
+def test_hits_are_counted_by_the_share_of_the_light(planted) -> None:
+    """Without grain: of 64 samples, as many as the patch's share of the pixel's light."""
+    box = np.array([[0.7, 0.72, 0.1, 0.12]])
+    moments = Moments.from_basis(planted(MOMENTS, box, np.ones((1, 3))), MOMENTS)
+    codes = []
+    for share in (1, 0.25, 0.03):
+        rest = np.full((1, 1, 3), 1 / share - 1)
+        found = known(np.concatenate([moments.coefficient[None], rest]), 64)
+        assert found.hits[0, 0] == pytest.approx(64 * share)
+        codes.append(choose("auto", moments, found, 0)[0][0])
+    assert codes == [BOX.code, BOX.code, WHOLE.code]
+
+
+def test_grain_counts_the_paths_that_matter() -> None:
+    """Half of the light, at random, less the other half: its square is the sum of the paths'
+    squares. Ten equal paths are ten hits; with one that outshines them all, there is one."""
+    rng = np.random.default_rng(0)
+    shape = (40, 40)
+    weights = np.ones((2, 10, *shape))
+    weights[1, 0] = 1000
+    sign = rng.choice([-1.0, 1.0], weights.shape)
+    size = weights.sum(axis=1)
+    coefficients = np.repeat(size.reshape(2, -1, 1) / 3, 3, axis=-1)
+    found = evidence(coefficients, shape, 1e6, (weights * sign).sum(axis=1)).hits
+    # windows of 25 pixels scatter; their middle is the truth
+    assert np.median(found[0]) == pytest.approx(10, rel=0.1)
+    assert np.median(found[1]) == pytest.approx((1009 / 1000) ** 2, rel=0.02)
+
+
+@given(seed=st.integers(0, 2**31), patches=st.integers(1, 60))
+def test_what_is_dropped_stays_under_its_share(planted, seed: int, patches: int) -> None:
+    """And nothing could be dropped with it: the next larger entry would pass the share."""
+    rng = np.random.default_rng(seed)
+    r = (10 ** rng.uniform(-6, 0, (patches, 20, 3))).astype(np.float32)
+    box = np.tile(np.array([0.1, 0.2, 0.3, 0.5]), (20, 1))
+    everything = known(r)
+    kept = np.empty((patches, 20), bool)
+    for k, c in enumerate(r):
+        moments = Moments.from_basis(planted(MOMENTS, box, c).astype(np.float32), MOMENTS)
+        kept[k] = choose("auto", moments, everything, k)[0] != NOTHING
+    size = r.sum(axis=-1, dtype=np.float64)
+    dropped = np.where(kept, 0, size).sum(axis=0)
+    assert (dropped <= DROPPED * size.sum(axis=0)).all()
+    smallest = np.where(kept, size, np.inf).min(axis=0)
+    assert (dropped + smallest > DROPPED * size.sum(axis=0)).all()
+
+
+@pytest.mark.parametrize("name", list(SUPPORTS))
+def test_one_model_for_all_takes_every_lit_pixel(planted, name: str) -> None:
+    r = np.array([[1.0, 0, 0], [0, 0, 0], [0, 0, 1e-6]])  # one channel is enough
+    box = np.array([[0.1, 0.2, 0.3, 0.4]] * 3)
+    patterns = pattern_set("moments_uv")
+    moments = Moments.from_basis(planted(patterns, box, r), patterns)
+    codes, parameters = alone(name, moments)
+    support = SUPPORTS[name]
+    assert codes.tolist() == [support.code, NOTHING, support.code]
+    assert parameters[support.code].shape == (2, len(support.parameters))
+
+
+def test_codes_are_for_good() -> None:
+    """They stand in files: a number is never used for another model."""
+    codes = {s.name: s.code for s in SUPPORTS.values()}
+    assert codes.items() >= {"whole": 1, "linear": 2, "box": 3}.items()
+    for code, support in BY_CODE.items():
+        assert support.code == code and 0 < code < 256
+    assert len(BY_CODE) == len({s.name for s in BY_CODE.values()})
+    assert {WHOLE, LINEAR, BOX} <= set(BY_CODE.values()) and NOTHING not in BY_CODE
+
+
+def test_a_choice_that_cannot_be() -> None:
+    with pytest.raises(FieldError, match="no support model 'gauss': choose one of auto, whole"):
+        check("gauss", MOMENTS)
+    for choice in ("auto", "box"):
+        with pytest.raises(PatternError, match="needs the moments u2, v2"):
+            check(choice, pattern_set("paper"))
+    for choice in ("linear", "whole"):
+        check(choice, pattern_set("paper"))
+    with pytest.raises(PatternError, match="'linear' needs the moments u, v"):
+        check("linear", pattern_set("white"))
+    check("whole", pattern_set("white"))
+    for choice in CHOICES:
+        check(choice, pattern_set("moments_uv"))

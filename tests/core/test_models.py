@@ -1,0 +1,195 @@
+"""What single support models find in planted transports: search, tilt, two components, colour."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from arto.core import matte
+from arto.core.environment import Environment
+from arto.core.hemicube import Hemicube
+from arto.core.light import PatchLight
+from arto.core.moments import Moments
+from arto.core.patterns import monomials, pattern_set
+from arto.core.search import box_averages, search
+from arto.core.supports import PER_CHANNEL, SUPPORTS
+
+SEES_A_BOX = ("moments", "moments_uv")
+
+
+def boxes(n: int, seed: int = 0, least: float = 0.05) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    size = rng.uniform(least, 0.9, (n, 2))
+    low = rng.uniform(size=(n, 2)) * (1 - size)
+    return np.stack([low[:, 0], low[:, 0] + size[:, 0], low[:, 1], low[:, 1] + size[:, 1]], -1)
+
+
+def images(patterns, averages: np.ndarray, colour=(1.0, 0.7, 0.4)) -> np.ndarray:
+    """Basis images (P, n, 3) of transports with these averages of the monomials (6, n)."""
+    return (patterns.matrix @ averages)[..., None] * np.array(colour)
+
+
+@pytest.mark.parametrize("name", SEES_A_BOX)
+def test_closed_form_and_search_find_planted_boxes_to_1e_5(name):
+    patterns, planted = pattern_set(name), boxes(200)
+    basis = images(patterns, box_averages(planted))
+    closed = SUPPORTS["box"].fit(Moments.from_basis(basis, patterns))
+    np.testing.assert_allclose(closed, planted, atol=1e-5)
+    found = search(basis, patterns, 1, finest=2.0**-20, follow=False)
+    np.testing.assert_allclose(found, planted, atol=1e-5)
+
+
+def test_search_is_as_good_as_its_last_step():
+    """What it finds explains the images to about one step; a thin box's sides are less certain."""
+    patterns, planted = pattern_set("moments"), boxes(100, 1)
+    found = search(images(patterns, box_averages(planted)), patterns, 1, finest=1 / 256)
+    assert np.abs(box_averages(found) - box_averages(planted)).max() < 2 / 256
+    assert np.median(np.abs(found - planted)) < 2 / 256
+
+
+def test_search_cannot_tell_a_quarter_turn_by_the_papers_patterns():
+    """The box and its quarter turn about its centre have the same error, which is none; what the
+    search returns explains the images, and is not always the box that was planted."""
+    patterns = pattern_set("paper")
+    planted = np.array([[0.4, 0.6, 0.1, 0.9], [0.1, 0.9, 0.4, 0.6]])
+    basis = images(patterns, box_averages(planted))
+    np.testing.assert_allclose(basis[:, 0], basis[:, 1], atol=1e-12)
+    found = search(basis, patterns, 1, finest=2.0**-16, follow=False)
+    np.testing.assert_allclose(found[0], found[1], atol=1e-9)
+    explained = images(patterns, box_averages(found))
+    np.testing.assert_allclose(explained, basis, atol=1e-3)
+
+
+def test_search_follows_the_previous_pixel_and_stays_on_the_patch():
+    """Along a row of equal pixels the start is the answer already; noise never leaves the patch."""
+    patterns = pattern_set("paper")
+    planted = np.repeat(boxes(4, 2), 8, axis=0)
+    basis = images(patterns, box_averages(planted))
+    found = search(basis, patterns, 4).reshape(4, 8, 4)
+    assert np.abs(found - found[:, :1]).max() < 1e-9
+    rng = np.random.default_rng(3)
+    noisy = basis * (1 + 0.4 * rng.normal(size=basis.shape))
+    found = search(np.maximum(noisy, 0), patterns, 4)
+    assert ((found >= 0) & (found <= 1)).all()
+    assert (found[:, 1] >= found[:, 0]).all() and (found[:, 3] >= found[:, 2]).all()
+
+
+def grid(density) -> np.ndarray:
+    """Averages of the monomials (6, 1) under a density on the patch, by quadrature."""
+    t = (np.arange(400) + 0.5) / 400
+    u, v = t[None, :], t[:, None]
+    weight = density(u, v)
+    return ((monomials(u, v) * weight).sum(axis=(1, 2)) / weight.sum())[:, None]
+
+
+@pytest.mark.parametrize("name", ["oriented_box", "gaussian"])
+def test_tilt_is_found(name):
+    """An ellipse at 30 degrees: its mean, deviations and tilt come back, and light that lies along
+    it is seen where the axis-aligned box is blind to the tilt."""
+    turn = np.radians(30)
+
+    def ellipse(u, v):
+        x, y = u - 0.5, v - 0.5
+        along, across = x * np.cos(turn) + y * np.sin(turn), y * np.cos(turn) - x * np.sin(turn)
+        return np.exp(-((along / 0.15) ** 2 + (across / 0.03) ** 2) / 2)
+
+    patterns = pattern_set("moments_uv")
+    moments = Moments.from_basis(images(patterns, grid(ellipse)), patterns)
+    mu, mv, du, dv, tilt = SUPPORTS[name].fit(moments)[0]
+    su = np.hypot(0.15 * np.cos(turn), 0.03 * np.sin(turn))
+    sv = np.hypot(0.15 * np.sin(turn), 0.03 * np.cos(turn))
+    covariance = (0.15**2 - 0.03**2) * np.cos(turn) * np.sin(turn)
+    np.testing.assert_allclose([mu, mv], 0.5, atol=1e-6)
+    np.testing.assert_allclose([du / 2, dv / 2], [su, sv], rtol=0.01)
+    assert 2 * tilt - 1 == pytest.approx(covariance / (su * sv), rel=0.02)
+
+    # light on one side of the diagonal through the patch's centre at the ellipse's angle
+    cube = Hemicube(faces=("top",), patches=1)
+    z, x, y = None, None, None
+    height, width = 256, 512
+    latitude = np.pi / 2 - (np.arange(height) + 0.5) / height * np.pi
+    azimuth = (0.5 - (np.arange(width) + 0.5) / width) * 2 * np.pi
+    z = np.sin(latitude)[:, None] * np.ones(width)
+    x = np.cos(latitude)[:, None] * np.cos(azimuth)
+    y = np.cos(latitude)[:, None] * np.sin(azimuth)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        u, v = (x / z + 1) / 2, (1 - y / z) / 2
+    off = (v - 0.5) * np.cos(turn) - (u - 0.5) * np.sin(turn)
+    stripe = np.where((z > 0.5) & (np.abs(off) < 0.06), 1.0, 0.0)
+    light = PatchLight(Environment(np.dstack([stripe] * 3).astype(np.float32)), cube, 128)
+    seen = {n: SUPPORTS[n].average(light, 0, SUPPORTS[n].fit(moments))[0, 0] for n in (name, "box")}
+    # two deviations across: 95% of the ellipse's light
+    assert seen[name] > 0.8
+    assert seen["box"] < 0.6
+
+
+def test_two_components_are_told_apart_off_the_middle_lines():
+    rng = np.random.default_rng(4)
+    n = 100
+    size = rng.uniform(0.02, 0.2, (n, 2))
+    # away from both middle lines
+    centre = rng.choice([0.22, 0.3, 0.7, 0.78], (n, 2))
+    narrow = np.stack(
+        [centre[:, 0] - size[:, 0], centre[:, 0] + size[:, 0],
+         centre[:, 1] - size[:, 1], centre[:, 1] + size[:, 1]], -1,
+    )  # fmt: skip
+    share = rng.uniform(0.1, 1, n)
+    whole = box_averages(np.tile([0.0, 1.0, 0.0, 1.0], (n, 1)))
+    averages = share * box_averages(narrow) + (1 - share) * whole
+    patterns = pattern_set("moments_uv")
+    moments = Moments.from_basis(images(patterns, averages), patterns)
+    found = SUPPORTS["double"].fit(moments)
+    np.testing.assert_allclose(found[:, 0], share, atol=1e-6)
+    np.testing.assert_allclose(found[:, 1:], narrow, atol=1e-5)
+
+
+def test_two_components_on_a_middle_line_become_one_box():
+    """There the six moments do not tell the share: nothing is made up."""
+    whole = box_averages(np.array([0.0, 1.0, 0.0, 1.0]))
+    narrow = box_averages(np.array([0.45, 0.55, 0.1, 0.2]))
+    averages = (0.5 * narrow + 0.5 * whole)[:, None]
+    patterns = pattern_set("moments_uv")
+    moments = Moments.from_basis(images(patterns, averages), patterns)
+    double = SUPPORTS["double"].fit(moments)
+    assert double[0, 0] >= 2 * 0.15  # the least share that has its box on the patch
+    assert ((double >= 0) & (double <= 1)).all()
+
+
+def test_a_support_for_each_channel():
+    """Dispersion: a box for each channel, which a shared support can only average."""
+    patterns, planted = pattern_set("moments"), [boxes(50, seed) for seed in (5, 6, 7)]
+    basis = np.stack([patterns.matrix @ box_averages(b) for b in planted], axis=-1)
+    moments = Moments.from_basis(basis, patterns, per_channel=True)
+    found = PER_CHANNEL["box"].fit(moments)
+    np.testing.assert_allclose(found, np.concatenate(planted, axis=-1), atol=1e-5)
+    rng = np.random.default_rng(8)
+    image = rng.random((64, 128, 3)).astype(np.float32)
+    light = PatchLight(Environment(image), Hemicube(patches=2), 16)
+    separate = PER_CHANNEL["box"].average(light, 3, found)
+    for c in range(3):
+        alone = SUPPORTS["box"].average(light, 3, planted[c])[:, c]
+        np.testing.assert_allclose(separate[:, c], alone, rtol=1e-3)
+    shared = SUPPORTS["box"].average(light, 3, SUPPORTS["box"].fit(moments))
+    assert np.abs(shared - separate).max() > 0.02
+
+
+def test_matte_is_one_cap_of_directions():
+    """A mirror's cap is a point, seen where it looks; a uniform sphere's is everything."""
+    cube, patterns = Hemicube(patches=2), pattern_set("moments")
+    basis = np.zeros((len(cube), 5, 2, 3))
+    basis[7, :, 0] = images(patterns, box_averages(np.array([[0.3, 0.3, 0.6, 0.6]])))[:, 0]
+    whole = images(patterns, box_averages(np.tile([0.0, 1, 0, 1], (1, 1))), (1, 1, 1))[:, 0]
+    for k in range(len(cube)):
+        basis[k, :, 1] = whole * cube.solid_angles[k]
+    caps = matte.fit(basis, patterns, cube)
+    np.testing.assert_allclose(caps.axis[0], cube.directions(7, 0.3, 0.6), atol=1e-9)
+    assert caps.cosine[0] == pytest.approx(1, abs=1e-9)
+    assert caps.cosine[1] == pytest.approx(-1, abs=1e-6)
+    rng = np.random.default_rng(9)
+    image = rng.random((16, 32, 3)).astype(np.float32).repeat(8, 0).repeat(8, 1)
+    environment = Environment(image)
+    light = PatchLight(environment, cube)
+    picture = matte.relight(caps, light)
+    k, u, v = cube.locate(caps.axis[0])
+    point = SUPPORTS["box"].average(light, int(k), np.array([[u, u, v, v]]))[0]
+    np.testing.assert_allclose(picture[0], point * [1.0, 0.7, 0.4], rtol=0.05)
+    np.testing.assert_allclose(picture[1], environment.irradiance(), rtol=0.15)
