@@ -46,6 +46,7 @@ def _parser() -> argparse.ArgumentParser:
     job = jobs.add_parser("relight", parents=[files], help="relight with the scene's world")
     job.add_argument("--own-lamps", type=float, help="how much of the scene's own lamps to add")
     job.add_argument("--environment-width", type=int)
+    job.add_argument("--denoise", action=argparse.BooleanOptionalAction, default=None)
     job.add_argument("--output", help="the EXR to write (default: beside the .blend)")
     return parser
 
@@ -74,8 +75,10 @@ def main(arguments: list[str]) -> int:
     for key, value in options.items():
         if value is not None:
             setattr(scene.arto, key, value)
-            if getattr(scene.arto, key) != value and isinstance(value, int):
-                print(f"ARTO: --{key} {value} is out of range", file=sys.stderr)
+            taken = getattr(scene.arto, key)
+            if isinstance(value, int | float) and abs(taken - value) > 1e-6 * abs(value):
+                option = key.replace("_", "-")
+                print(f"ARTO: --{option} {value} is out of range", file=sys.stderr)
                 return 2
     steps = {
         "capture": lambda: capture.capture(scene, layer),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import bpy
 
 from ..core.errors import ArtoError, CancelledError
@@ -9,6 +11,9 @@ from . import capture, fit, hemicube_planes, paths, relight
 from .bounds import scene_bounds
 from .stage import stage
 from .work import Progress, ProgressLines, Render, Steps, run
+
+# Steps are taken for this long before the window is drawn again.
+SECONDS_A_TICK = 0.1
 
 
 class _Quick(bpy.types.Operator):
@@ -120,8 +125,12 @@ class _Work(bpy.types.Operator):
         if self._waiting and (self._waiting.state == "waiting" or bpy.app.is_job_running("RENDER")):
             return {"PASS_THROUGH"}
         self._waiting = None
+        until = time.perf_counter() + SECONDS_A_TICK
         try:
             step = next(self._steps)
+            while not isinstance(step, Render) and time.perf_counter() < until:
+                self._last = step.text
+                step = next(self._steps)
         except StopIteration:
             return self._quit(context, "INFO", self._last)
         except CancelledError as e:

@@ -39,6 +39,7 @@ class ARTO_PT_main(_Panel, bpy.types.Panel):
         column.operator("arto.fit", icon="MOD_LATTICE")
         column.separator()
         column.prop(settings, "own_lamps")
+        column.prop(settings, "denoise")
         column.operator("arto.relight", icon="WORLD")
 
 

@@ -78,7 +78,7 @@ def wire(scene: bpy.types.Scene, group: Any) -> Any:
         None,
     )
     if node is None:
-        below = min((n.location.y - max(n.height, 400) for n in tree.nodes), default=0.0)
+        below = min((n.location.y - max(n.height, 200) for n in tree.nodes), default=0.0)
         node = tree.nodes.new("CompositorNodeGroup")
         node.node_tree = group
         node.label = GROUP

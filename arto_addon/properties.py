@@ -64,7 +64,7 @@ class ArtoSettings(bpy.types.PropertyGroup):
         default=set(FACE_NAMES),
     )
     patches: IntProperty(
-        name="Patches a Side",
+        name="Patches",
         description="Patches along the edge of a face (the paper: 4). More see finer light, "
         "and each is noisier",
         min=1,
@@ -72,7 +72,7 @@ class ArtoSettings(bpy.types.PropertyGroup):
         default=4,
     )
     half_sides: BoolProperty(
-        name="Half-Height Sides",
+        name="Half Height",
         description="The four sides only above the horizon",
         default=False,
     )
@@ -116,7 +116,7 @@ class ArtoSettings(bpy.types.PropertyGroup):
         name="Renders",
         description="How the patches and patterns are told apart",
         items=[
-            ("all", "One", "All patches and patterns in one render, by light groups"),
+            ("all", "All at Once", "All patches and patterns in one render, by light groups"),
             ("pattern", "One a Pattern", "A light group for each patch"),
             ("single", "One a Patch and Pattern", "As in the paper; slow"),
         ],
@@ -137,7 +137,7 @@ class ArtoSettings(bpy.types.PropertyGroup):
     )
     seed: IntProperty(name="Seed", description="Seed of the capture's noise", min=0, default=0)
     memory: IntProperty(
-        name="Memory Budget",
+        name="Memory (MB)",
         description="Megabytes that the passes of one render may take; a larger picture is "
         "captured in tiles",
         min=16,
@@ -150,14 +150,20 @@ class ArtoSettings(bpy.types.PropertyGroup):
         default="auto",
     )
     own_lamps: FloatProperty(
-        name="Scene's Own Lamps",
+        name="Own Lamps",
         description="How much of the scene's own lamps and emitters the relit picture has",
         min=0.0,
         soft_max=2.0,
         default=1.0,
     )
+    denoise: BoolProperty(
+        name="Denoise",
+        description="Denoise the relit picture with Open Image Denoise, steered by the captured "
+        "albedo and normal",
+        default=True,
+    )
     environment_width: IntProperty(
-        name="World Resolution",
+        name="World Width",
         description="Width in pixels that the world is brought to before relighting. Mirrors "
         "show no more detail than this",
         min=64,

@@ -10,7 +10,7 @@ from ..core.field import Field
 from ..core.light import PatchLight
 from ..core.relight import over
 from ..core.relight import relight as relight_field
-from . import paths, plate
+from . import denoise, paths, plate
 from .capture import check_same_shot
 from .work import Progress, Steps
 from .world import background, bake, check_world
@@ -45,14 +45,26 @@ def relight(scene: bpy.types.Scene) -> Steps:
     yield Progress(0.6, "relighting")
     picture = relight_field(field, light, settings.own_lamps)
     lap("relight")
+    denoised = "no"
+    if settings.denoise:
+        yield Progress(0.7, "denoising")
+        if denoise.available():
+            picture[..., :3] = denoise.denoise(picture[..., :3], denoise.guides_of(field))
+            denoised = "Open Image Denoise"
+        else:
+            # said here, in the file's header and in the last line
+            denoised = "no: this Blender was built without Open Image Denoise"
+            yield Progress(0.7, f"denoising: {denoised}")
+        lap("denoise")
     if not scene.render.film_transparent:
         yield Progress(0.8, "adding the world behind")
         picture = over(picture, background(scene))
         lap("background")
     yield Progress(0.9, f"writing {path}")
     world = scene.world.name if scene.world else ""
-    plate.write(path, picture, {"scene": scene.name, "world": world})
+    plate.write(path, picture, {"scene": scene.name, "world": world, "denoised": denoised})
     plate.wire(scene, plate.node_group(plate.show(path)))
     lap("write")
-    yield Progress(1.0, f"wrote {path}")
+    say = f" (denoised: {denoised})" if settings.denoise else ""
+    yield Progress(1.0, f"wrote {path}{say}")
     return path, seconds

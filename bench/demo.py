@@ -40,11 +40,14 @@ def demo(
 
     # a first render pays for loading Cycles; nobody should be charged with it
     reference.render(scene, 1, 0)
-    plain = reference.render(scene, samples, 0).seconds
+    plain = reference.render(scene, samples, 0)
     scene.render.film_transparent = False
     capture_seconds = timed(bpy.ops.arto.capture)
     fit_seconds = timed(bpy.ops.arto.fit)
     relight_seconds = timed(bpy.ops.arto.relight)
+    scene.arto.denoise, scene.arto.output = False, str((out / "relit_raw.exr").resolve())
+    bpy.ops.arto.relight()
+    rival = reference.render(scene, samples, 0, denoise=True)
     captured = CaptureSet(paths.capture_folder(scene))
     field = Field(paths.field_folder(scene))
 
@@ -52,7 +55,7 @@ def demo(
     one, two = (
         reference.reference(scene_name, world, size, many, seed, lambda: scene) for seed in (1, 2)
     )
-    relit = exr.read(out / "relit.exr")[""][..., :3]
+    relit, raw = (exr.read(out / f"{n}.exr")[""][..., :3] for n in ("relit", "relit_raw"))
     truth = (one.rgb + two.rgb) / 2
     seen = one.alpha > 0.999
     error = np.full(seen.shape, np.nan)
@@ -64,13 +67,18 @@ def demo(
         "hdri": hdri,
         "mean_relative_error": metrics.mean_relative_error(relit, truth, seen),
         "noise_floor": metrics.mean_relative_error(one.rgb, two.rgb, seen),
+        "mean_relative_error_not_denoised": metrics.mean_relative_error(raw, truth, seen),
+        "mean_relative_error_of_plain_render": metrics.mean_relative_error(plain.rgb, truth, seen),
+        "mean_relative_error_of_plain_render_denoised": metrics.mean_relative_error(
+            rival.rgb, truth, seen
+        ),
         "error_by_material": {
             name: metrics.mean_relative_error(relit, truth, seen & (one.index == index))
             for name, index in scenes.MATERIALS[scene_name].items()
         },
-        "plain_render_seconds": plain,
+        "plain_render_seconds": plain.seconds,
         "capture_seconds": capture_seconds,
-        "capture_over_plain": capture_seconds / plain,
+        "capture_over_plain": capture_seconds / plain.seconds,
         "renders": sum(map(len, captured.files)),
         "fit_seconds": fit_seconds,
         "relight_seconds": relight_seconds,

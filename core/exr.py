@@ -1,8 +1,9 @@
 """The one door to EXR files. Rows run top-down, as in the file; data is float32 unless it was half.
 
 Blender carries an OpenEXR of its own whose symbols the wheel's library would otherwise find first:
-compressed reads then report errors for good pixels. Loading the wheel with its own symbols first
-(RTLD_DEEPBIND, Linux) keeps the two apart.
+compressed reads then report errors for good pixels. The extension's wheels are changed so that
+they find their own first (bench/wheel_symbols.py). RTLD_DEEPBIND is no way: it also passes by the
+allocator that Blender puts in malloc's place, and Blender aborts.
 """
 
 from __future__ import annotations
@@ -10,7 +11,6 @@ from __future__ import annotations
 import contextlib
 import os
 import struct
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -29,16 +29,8 @@ COLOUR_SPACES = {
 
 
 def _openexr() -> Any:
-    if "OpenEXR" in sys.modules or not hasattr(os, "RTLD_DEEPBIND"):
-        import OpenEXR
+    import OpenEXR
 
-        return OpenEXR
-    flags = sys.getdlopenflags()
-    sys.setdlopenflags(flags | os.RTLD_DEEPBIND)
-    try:
-        import OpenEXR
-    finally:
-        sys.setdlopenflags(flags)
     return OpenEXR
 
 

@@ -281,6 +281,10 @@ class Field:
         size = sum(f.stat().st_size for f in files if f.is_file())
         return size / sum(t.region.pixels for t in self.tiles)
 
+    def has_layer(self, name: str) -> bool:
+        """Whether every tile has the layer."""
+        return bool(self.tiles) and all(t.has_layer(name) for t in self.tiles)
+
     def layer(self, name: str) -> NDArray[np.float32]:
         """A layer of the whole picture, zero outside the tiles -> (H, W) or (H, W, 3)."""
         out: NDArray[np.float32] | None = None
