@@ -54,6 +54,13 @@ def _figure3(options: argparse.Namespace) -> None:
     print(f"look at {options.out}")
 
 
+def _colour(options: argparse.Namespace) -> None:
+    from .colour import colour, table
+
+    size = (options.width, options.width * 3 // 4)
+    print(table(colour(options.json, size, options.samples, options.many)))
+
+
 def _patterns(options: argparse.Namespace) -> None:
     from arto.core.patterns import MONOMIALS, PATTERN_SETS
 
@@ -95,6 +102,13 @@ def main() -> int:
     c.add_argument("--width", type=int, default=80)
     c.add_argument("--samples", type=int, default=2048)
     c.set_defaults(run=_figure3)
+
+    c = commands.add_parser("colour", help="a support for each channel, on prism and coat")
+    c.add_argument("--json", type=Path, default=Path("out/colour.json"))
+    c.add_argument("--width", type=int, default=48)
+    c.add_argument("--samples", type=int, default=8192)
+    c.add_argument("--many", type=int, default=2048)
+    c.set_defaults(run=_colour)
 
     c = commands.add_parser("patterns", help="what each set of patterns can identify")
     c.set_defaults(run=_patterns)

@@ -7,6 +7,7 @@ size, samples and seed, Blender's version), so none is rendered twice and none i
 from __future__ import annotations
 
 import hashlib
+import inspect
 import json
 import time
 from collections.abc import Callable
@@ -93,6 +94,9 @@ def render(scene: bpy.types.Scene, samples: int, seed: int, denoise: bool = Fals
 def content_key(**decides: Any) -> str:
     """A name for what these values, the scenes' script and Blender's version decide."""
     script = Path(scenes.__file__).read_bytes()
+    made = inspect.getsourcefile(scenes.SCENES[decides["scene"]])
+    if made and not Path(made).samefile(scenes.__file__):
+        script += Path(made).read_bytes()
     text = json.dumps([bpy.app.version_string, decides], sort_keys=True).encode()
     return hashlib.sha256(script + text).hexdigest()[:20]
 

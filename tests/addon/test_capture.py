@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import stat
+import subprocess
 from pathlib import Path
 
 import bpy
@@ -292,3 +293,27 @@ def test_grain_can_be_left_out(tmp_path):
     scene = small_scene(tmp_path)
     scene.arto.grain = False
     assert captured(scene).read(0).grain is None
+
+
+def test_full_disk(tmp_path):
+    """A disk too small for the render: a message, nothing half-written, the scene as before."""
+    small = tmp_path / "small"
+    small.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=128k", "tmpfs", str(small)], capture_output=True
+    )
+    if mounted.returncode:
+        pytest.skip("a small disk can only be mounted by root")
+    try:
+        scene = small_scene(tmp_path)
+        scene.arto.folder = str(small)
+        before = snapshot()
+        with pytest.raises(ArtoError, match=r"make room|again"):
+            captured(scene)
+        assert not differences(before, snapshot())
+        assert not list(small.rglob("*.exr*"))
+        # with room the same capture works
+        subprocess.run(["mount", "-o", "remount,size=64m", str(small)], check=True)
+        assert captured(scene).read(0).basis.max() > 0
+    finally:
+        subprocess.run(["umount", str(small)], check=True)

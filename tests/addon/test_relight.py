@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import fit, paths, plate, relight, work
+from arto.arto_addon import denoise, fit, paths, plate, relight, work
 from arto.core import exr
 from arto.core.errors import ArtoError, CaptureSetError, FieldError, SceneError
 from arto.core.metrics import mean_relative_error
@@ -223,3 +223,34 @@ def test_bad_output_and_bad_world_lose_nothing(tmp_path):
     with pytest.raises(FieldError, match="fit again"):
         relit(scene)
     assert plate.IMAGE in bpy.data.images
+
+
+def test_denoising_brings_the_plate_nearer_to_the_truth(tmp_path):
+    scene = transparent(small_scene(tmp_path))
+    scene.arto.patches = 2
+    hdri(scene, smooth())
+    noisy = run_all(scene)
+    scene.arto.denoise = True
+    clean = relit(scene)
+    truth = cycles(scene, 2048, 1, tmp_path)
+    seen = truth[..., 3] > 0.999
+    errors = [mean_relative_error(p[..., :3], truth[..., :3], seen) for p in (noisy, clean)]
+    assert errors[1] < 0.8 * errors[0]
+    assert abs(clean[seen].mean() / noisy[seen].mean() - 1) < 0.02
+    np.testing.assert_array_equal(clean[..., 3], noisy[..., 3])
+    header = exr.header(tmp_path / "relit.exr")
+    assert header["arto.denoised"] == "Open Image Denoise"
+
+
+def test_without_a_denoiser_the_plate_says_so(tmp_path, monkeypatch):
+    """A build without Open Image Denoise hands pictures through: never silently."""
+    scene = transparent(small_scene(tmp_path))
+    noisy = run_all(scene)
+    monkeypatch.setattr(denoise, "_available", [])
+    monkeypatch.setattr(denoise, "denoise", lambda picture, guides: picture)
+    scene.arto.denoise = True
+    steps = []
+    path, _ = work.run(relight.relight(scene), steps.append)
+    np.testing.assert_array_equal(exr.read(path)[""], noisy)
+    assert "without Open Image Denoise" in steps[-1].text
+    assert "without Open Image Denoise" in exr.header(path)["arto.denoised"]

@@ -40,8 +40,8 @@ def test_auto_takes_the_plane_for_broad_light_and_the_box_for_narrow(planted) ->
     box = np.array(
         [
             [0.5 - h, 0.5 + h + 0.02, 0.5 - h - 0.01, 0.5 + h + 0.01],
-            [0.5 - h + 0.01, 0.5 + h - 0.01, 0.0, 1.0],  # narrow one way
-            [0.0, 1.0, 0.2, 0.3],
+            [0.5 - h + 0.01, 0.5 + h - 0.01, 0.4, 0.5],  # narrow both ways
+            [0.0, 1.0, 0.2, 0.3],  # narrow one way
             [0.2, 0.9, 0.1, 0.9],
             [0.3, 0.4, 0.3, 0.4],
         ]
@@ -50,9 +50,9 @@ def test_auto_takes_the_plane_for_broad_light_and_the_box_for_narrow(planted) ->
     r[3] = 0  # no light
     moments = Moments.from_basis(planted(MOMENTS, box, r), MOMENTS)
     codes, parameters = alone("auto", moments)
-    assert codes.tolist() == [LINEAR.code, BOX.code, BOX.code, NOTHING, BOX.code]
-    np.testing.assert_allclose(parameters[BOX.code], box[[1, 2, 4]], atol=1e-9)
-    np.testing.assert_allclose(parameters[LINEAR.code], [[0.51, 0.5]], atol=1e-9)
+    assert codes.tolist() == [LINEAR.code, BOX.code, LINEAR.code, NOTHING, BOX.code]
+    np.testing.assert_allclose(parameters[BOX.code], box[[1, 4]], atol=1e-9)
+    np.testing.assert_allclose(parameters[LINEAR.code], [[0.51, 0.5], [0.5, 0.25]], atol=1e-9)
 
 
 def test_a_broad_light_in_the_middle_is_the_whole_patch(planted) -> None:

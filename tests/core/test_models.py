@@ -195,3 +195,44 @@ def test_matte_is_one_cap_of_directions():
     point = SUPPORTS["box"].average(light, int(k), np.array([[u, u, v, v]]))[0]
     np.testing.assert_allclose(picture[0], point * [1.0, 0.7, 0.4], rtol=0.05)
     np.testing.assert_allclose(picture[1], environment.irradiance(), rtol=0.15)
+
+
+@pytest.mark.parametrize("border", ["patch", "face"])
+def test_narrow_support_over_a_border_does_not_tear(border):
+    """A mirror's little box that slides over a border: each patch has its part, and together they
+    see what one box would, at every step. The sun is on the border itself."""
+    cube, patterns = Hemicube(patches=2), pattern_set("moments")
+    left = cube.face_slice("back").start + (0 if border == "patch" else 1)
+    right = left + 1 if border == "patch" else cube.face_slice("right").start
+    sun = cube.directions(left, np.array(1.0), np.array(0.5))
+    height, width = 256, 512
+    latitude = np.pi / 2 - (np.arange(height) + 0.5) / height * np.pi
+    azimuth = (0.5 - (np.arange(width) + 0.5) / width) * 2 * np.pi
+    d = np.empty((height, width, 3))
+    d[..., 0] = np.cos(latitude)[:, None] * np.cos(azimuth)
+    d[..., 1] = np.cos(latitude)[:, None] * np.sin(azimuth)
+    d[..., 2] = np.sin(latitude)[:, None]
+    disc = np.where(d @ sun > np.cos(np.radians(2)), 100.0, 1.0)
+    light = PatchLight(Environment(np.dstack([disc] * 3).astype(np.float32)), cube, 128)
+    size, seen = 0.2, []
+    for at in np.linspace(0.7, 1.3, 61):
+        total = 0.0
+        for k, shift in ((left, 0.0), (right, 1.0)):
+            u0, u1 = np.clip([at - size / 2 - shift, at + size / 2 - shift], 0, 1)
+            share = (u1 - u0) / size
+            if share <= 0:
+                continue
+            basis = share * images(
+                patterns, box_averages(np.array([[u0, u1, 0.4, 0.6]])), (1, 1, 1)
+            )
+            box = SUPPORTS["box"]
+            moments = Moments.from_basis(basis, patterns)
+            total += share * box.average(light, k, box.fit(moments))[0, 0]
+        seen.append(total)
+    seen = np.array(seen)
+    # no sun at both ends, all of it in the middle, and no step larger than the box's own edge makes
+    assert seen[0] == pytest.approx(1) and seen[-1] == pytest.approx(1)
+    assert seen[30] > 0.9 * seen.max() > 5
+    inside = (np.linspace(0.7, 1.3, 61) > 0.96) & (np.linspace(0.7, 1.3, 61) < 1.04)
+    assert np.ptp(seen[inside]) < 0.15 * seen[30]
+    assert np.abs(np.diff(seen)).max() < 0.35 * seen.max()
