@@ -11,7 +11,9 @@ import os
 import re
 import shlex
 import shutil
+import signal
 import subprocess
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -351,3 +353,28 @@ def test_escape_in_the_middle(program: Program, scene: Path) -> None:
     assert pressed["seconds"] < 20
     assert pressed["before"] == pressed["after"]
     assert not list((scene.parent / "arto").rglob("*.exr*"))
+
+
+def test_interrupted_in_batch(program: Program, scene: Path) -> None:
+    """Ctrl-C during the first of several tiles: exit code 130, no half file, and the capture can
+    be made after it. (That finished tiles are kept is tested in tests/addon.)"""
+    capture = [*program.command, "-b", scene, "--command", "arto", "capture", "--patches", "4"]
+    line = [*map(str, capture), "--memory", "16", "--samples"]
+    running = subprocess.Popen(
+        [*line, "20000"], cwd=ROOT, env=program.environment, stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT, text=True, start_new_session=True,
+    )  # fmt: skip
+    printed = ""
+    for text in running.stdout:
+        printed += text
+        if "render 1 of" in text:
+            # Blender forgets a signal that comes before its render has begun
+            time.sleep(3)
+            os.killpg(running.pid, signal.SIGINT)
+    assert running.wait(60) == 130, printed
+    assert "cancelled" in printed
+    head = json.loads(next((scene.parent / "arto").rglob("capture.json")).read_text())
+    assert len(head["tiles"]) > 1 and not any(t["done"] for t in head["tiles"])
+    assert not list((scene.parent / "arto").rglob("*.exr*"))
+    done = program.run(*map(str, capture[len(program.command) :]), "--memory", "16")
+    assert done.returncode == 0, said(done)

@@ -227,7 +227,7 @@ def test_bad_output_and_bad_world_lose_nothing(tmp_path):
 
 def test_denoising_brings_the_plate_nearer_to_the_truth(tmp_path):
     scene = transparent(small_scene(tmp_path))
-    scene.arto.patches = 2
+    scene.arto.samples, scene.arto.patches = 8, 2
     hdri(scene, smooth())
     noisy = run_all(scene)
     scene.arto.denoise = True
