@@ -1,17 +1,19 @@
 """Which support model each pixel and patch gets: the smallest that explains its light.
 
-The candidates nest: nothing, the whole patch (mean and spread of a uniform patch), the linear
-projection (its own mean, the spread of a linear density), the box (its own mean and spread). A
-larger one is taken when it explains the moments better by more than its parameters would by
-chance: Akaike's criterion with the correction for few samples (AICc). How many independent samples
-there were is known from the capture's grain: two points in a patch are no evidence of a narrow
-support, however often one of them was hit.
+The candidates nest: nothing, the whole patch, the linear projection, the box. How many independent
+light paths an entry had is known from the capture's grain, and decides how its moments are read:
 
-Enough evidence still does not make a box the better filter. A reflection that is narrow both ways
-is one; what is broad, or narrow one way only, is mostly a diffuse view of a patch that something
-hides in part, and there a box lets a sun in or shuts it out by its edge's last digit, while the
-linear projection errs by little. Where one overtakes the other was measured, on two scenes and
-eight HDRIs (docs/measurements.md).
+- A *box* must be shown. Its spread must explain the moments better than a linear density's by more
+  than two parameters would by chance: Akaike's criterion with the correction for few samples
+  (AICc). Two points in a patch are no evidence of a narrow support, however often one was hit.
+- The *whole patch* must be shown too: that the light's mean is its middle, to `CENTRED`. A mean
+  that is not known is kept as it is, in the linear projection. That is noise, but unbiased noise,
+  which averages out over pixels and can be denoised; a mean rounded to the middle stays wrong.
+- Enough evidence still does not make a box the better filter. A reflection that is narrow both ways
+  is one; what is broad, or narrow one way only, is mostly a diffuse view of a patch that something
+  hides in part, and there a box lets a sun in or shuts it out by its edge's last digit, while the
+  linear projection errs by little. Where one overtakes the other was measured, on two scenes and
+  eight HDRIs (docs/measurements.md).
 """
 
 from __future__ import annotations
@@ -34,6 +36,8 @@ CHOICES = ("auto", *SUPPORTS, SEARCH, STAGE_AND_MATTE)
 DROPPED = 1e-3
 # Pixels along the side of the window that an entry's noise is measured in.
 WINDOW = 5
+# A mean this near to the patch's middle, its own uncertainty included, is the middle.
+CENTRED = 0.02
 # Half width, of the patch, from which on the linear projection beats the box.
 BROAD = 0.35
 
@@ -122,25 +126,25 @@ def automatic(moments: Moments, hits: NDArray, least: NDArray) -> NDArray[np.uin
 
     hits, least: (n,), see `Evidence`.
     """
-    n = hits
-    # as in `evidence`: in single precision the smallest entry to keep would fall under itself
+    n = np.maximum(hits, 1e-9)
     size = moments.coefficient.sum(axis=-1, dtype=np.float64)
-    mean_gain = np.zeros(len(size))
+    off_centre = np.zeros(len(size))
     spread_gain = np.zeros(len(size))
     narrow = np.ones(len(size), bool)
     for mean, variance in zip(moments.mean, moments.variance, strict=True):
         off = mean - 0.5
-        # twice the gain in log likelihood of a mean of its own, and then of a spread of its own,
-        # a sample; a linear density has the variance 1/12 - off^2
-        mean_gain += off * off / UNIFORM_VARIANCE
+        off_centre += off * off
+        # twice the gain in log likelihood, a sample, of a spread of its own over that of a linear
+        # density, 1/12 - off^2
         expected = np.maximum(UNIFORM_VARIANCE - off * off, UNIFORM_VARIANCE / 4)
         ratio = np.maximum(variance / expected, 1e-9)
         spread_gain += ratio - 1 - np.log(ratio)
         narrow &= 3 * variance < BROAD**2
+    uncertain = np.sqrt(2 * UNIFORM_VARIANCE / n)
+    centred = np.sqrt(off_centre) + uncertain < CENTRED
     with np.errstate(invalid="ignore"):
-        linear = np.where(np.isinf(n), mean_gain > 0, n * mean_gain > _aicc(2, n))
         box = np.where(np.isinf(n), True, n * spread_gain > _aicc(4, n) - _aicc(2, n))
-    codes = np.where(linear, LINEAR.code, WHOLE.code)
+    codes = np.where(centred, WHOLE.code, LINEAR.code)
     codes = np.where(narrow & box, BOX.code, codes)
     return np.where((size > 0) & (size >= least), codes, NOTHING).astype(np.uint8)
 
