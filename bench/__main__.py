@@ -18,6 +18,11 @@ def _demo(options: argparse.Namespace) -> None:
         (options.width, options.width * 3 // 4),
         options.samples,
         options.many,
+        options.picture,
+        patches=options.patches,
+        patterns=options.patterns,
+        support=options.support,
+        grain=options.patterns != "white",
     )
     print(json.dumps(report, indent=1))
     print(f"look at {options.out / 'comparison.png'}")
@@ -82,6 +87,10 @@ def main() -> int:
     c.add_argument("--width", type=int, default=160)
     c.add_argument("--samples", type=int, default=128)
     c.add_argument("--many", type=int, default=512, help="samples of each of two references")
+    c.add_argument("--patches", type=int, default=4)
+    c.add_argument("--patterns", default="moments")
+    c.add_argument("--support", default="auto")
+    c.add_argument("--picture", type=Path, help="put the comparison there as well")
     c.set_defaults(run=_demo)
 
     c = commands.add_parser("stability", help="hard synthetic cases for every support model")

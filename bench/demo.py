@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import time
 from pathlib import Path
 from typing import Any
@@ -19,17 +20,26 @@ from .machine import machine
 
 
 def demo(
-    out: Path, scene_name: str, hdri: str, size: tuple[int, int], samples: int, many: int
+    out: Path,
+    scene_name: str,
+    hdri: str,
+    size: tuple[int, int],
+    samples: int,
+    many: int,
+    picture: Path | None = None,
+    **settings: Any,
 ) -> dict[str, Any]:
     """Run the main job as an artist's batch run would and leave the results in `out`.
 
-    many: samples of each of the two reference renders. Returns what goes into `report.json`.
+    many: samples of each of the two reference renders; picture: where else to put the comparison;
+    settings: other values for `scene.arto`. Returns what goes into `report.json`.
     """
     scene = reference.new_scene(scene_name, *size)
     world = reference.World(hdri)
     world.apply(scene)
     out.mkdir(parents=True, exist_ok=True)
-    scene.arto.samples = samples
+    for name, value in {"samples": samples, **settings}.items():
+        setattr(scene.arto, name, value)
     scene.arto.output = str((out / "relit.exr").resolve())
     bpy.ops.wm.save_as_mainfile(filepath=str((out / "scene.blend").resolve()))
 
@@ -103,5 +113,7 @@ def demo(
             f"(noise floor {report['noise_floor']:.3f})",
         ),
     )
+    if picture:
+        shutil.copyfile(out / "comparison.png", picture)
     (out / "report.json").write_text(json.dumps(report, indent=1))
     return report
