@@ -154,6 +154,8 @@ def prepare(on: Stage, layers: int) -> None:
         "cycles.use_fast_gi": False,
         "cycles.transparent_max_bounces": on.scene.cycles.transparent_max_bounces + layers,
         "render.film_transparent": True,
+        # glass that lets the film through would let the patches through as well
+        "cycles.film_transparent_glass": False,
         "render.use_persistent_data": False,
     }.items():
         on.change(path, value)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 
 import bpy
+import numpy as np
 
 from ..core.field import Field
 from ..core.light import PatchLight
@@ -56,6 +57,8 @@ def relight(scene: bpy.types.Scene) -> Steps:
             denoised = "no: this Blender was built without Open Image Denoise"
             yield Progress(0.7, f"denoising: {denoised}")
         lap("denoise")
+    # a plane laid through a sun beside darkness undershoots; a picture has no negative light
+    np.maximum(picture, 0, out=picture)
     if not scene.render.film_transparent:
         yield Progress(0.8, "adding the world behind")
         picture = over(picture, background(scene))

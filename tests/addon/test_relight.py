@@ -9,9 +9,13 @@ import bpy
 import numpy as np
 import pytest
 from arto.arto_addon import denoise, fit, paths, plate, relight, work
+from arto.arto_addon.world import bake
 from arto.core import exr
 from arto.core.errors import ArtoError, CaptureSetError, FieldError, SceneError
+from arto.core.field import Field
+from arto.core.light import PatchLight
 from arto.core.metrics import mean_relative_error
+from arto.core.relight import relight as relight_field
 from scene_tools import (
     add_mesh,
     captured,
@@ -287,3 +291,17 @@ def test_narrow_reflection_beats_sixteen_times_as_many_whole_patches(tmp_path):
         errors[name] = mean_relative_error(run_all(scene)[..., :3], truth)
     assert errors["auto"] < 0.5 * errors["whole"], errors
     assert errors["auto"] < 0.1, errors
+
+
+def test_plate_has_no_negative_light(tmp_path):
+    """A sun in a corner of a patch, seen from its other side: the linear projection undershoots."""
+    scene = transparent(small_scene(tmp_path))
+    scene.arto.samples, scene.arto.support = 16, "linear"
+    sky = np.full((64, 128, 3), 0.01)
+    sky[14, 20] = 1e4
+    hdri(scene, sky)
+    picture = run_all(scene)
+    field = Field(paths.field_folder(scene))
+    assert relight_field(field, PatchLight(bake(scene, 1024), field.hemicube)).min() < -0.01
+    assert picture.min() == 0
+    assert picture.max() > 1
