@@ -42,6 +42,10 @@ def _parser() -> argparse.ArgumentParser:
 
     job = jobs.add_parser("fit", parents=[files], help="fit the reflectance field")
     job.add_argument("--support", choices=CHOICES)
+    separate = "a support for each channel"
+    job.add_argument(
+        "--separate", action=argparse.BooleanOptionalAction, default=None, help=separate
+    )
 
     job = jobs.add_parser("relight", parents=[files], help="relight with the scene's world")
     job.add_argument("--own-lamps", type=float, help="how much of the scene's own lamps to add")

@@ -21,7 +21,9 @@ def fit(scene: bpy.types.Scene) -> Steps:
     check_same_shot(scene, captured.head, "the capture set")
     folder = paths.field_folder(scene)
     about = {"shot": captured.head.get("shot", {})}
-    for share, text in fit_captured(captured, folder, scene.arto.support, **about):
+    settings = scene.arto
+    work = fit_captured(captured, folder, settings.support, settings.separate, **about)
+    for share, text in work:
         yield Progress(share, text)
     yield Progress(1.0, f"fitted {len(captured.hemicube)} patches of {captured.pixels} pixels")
     return folder

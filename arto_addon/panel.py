@@ -36,6 +36,7 @@ class ARTO_PT_main(_Panel, bpy.types.Panel):
         column.operator("arto.capture", icon="RENDER_STILL")
         column.separator()
         column.prop(settings, "support")
+        column.prop(settings, "separate")
         column.operator("arto.fit", icon="MOD_LATTICE")
         column.separator()
         column.prop(settings, "own_lamps")

@@ -29,6 +29,12 @@ _SUPPORT_TEXT = {
     "whole": ("Whole Patch", "Every direction of a patch counts the same (Light Stage)"),
     "linear": ("Linear", "The light taken as a plane over each patch"),
     "box": ("Box", "The paper's axis-aligned rectangle, in closed form"),
+    "quadratic": ("Quadratic", "The light taken as a paraboloid over each patch"),
+    "oriented_box": ("Oriented Box", "A tilted rectangle; needs the pattern uv"),
+    "gaussian": ("Gaussian", "A tilted elliptical Gaussian; needs the pattern uv"),
+    "double": ("Two Components", "A broad base and a narrow box; needs the pattern uv"),
+    "search": ("Paper's Search", "The box by the paper's Algorithm 1; slow"),
+    "stage_and_matte": ("Light Stage and Matte", "A box in the brightest patch, whole the others"),
 }
 
 
@@ -148,6 +154,11 @@ class ArtoSettings(bpy.types.PropertyGroup):
         description="How the light within a patch is filtered",
         items=[(n, *_SUPPORT_TEXT.get(n, (_title(n), ""))) for n in CHOICES],
         default="auto",
+    )
+    separate: BoolProperty(
+        name="Per Channel",
+        description="A support for each of red, green and blue: for dispersion and coloured coats",
+        default=False,
     )
     own_lamps: FloatProperty(
         name="Own Lamps",

@@ -116,7 +116,7 @@ def check(choice: str, patterns: PatternSet) -> None:
 def _aicc(parameters: int, n: NDArray) -> NDArray:
     """AICc's price of that many parameters from n samples."""
     few = n - parameters - 1
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore"):
         price = 2 * parameters * (1 + (parameters + 1) / few)
     return np.where(np.isinf(n), 2 * parameters, np.where(few > 0, price, np.inf))
 

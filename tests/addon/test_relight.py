@@ -305,3 +305,10 @@ def test_plate_has_no_negative_light(tmp_path):
     assert relight_field(field, PatchLight(bake(scene, 1024), field.hemicube)).min() < -0.01
     assert picture.min() == 0
     assert picture.max() > 1
+
+
+def test_a_support_for_each_channel_from_the_settings(tmp_path):
+    scene = small_scene(tmp_path)
+    scene.arto.support, scene.arto.separate = "box", True
+    run_all(scene)
+    assert set(Field(paths.field_folder(scene)).shares()) == {"box_rgb", "nothing"}
