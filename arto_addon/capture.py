@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import itertools
 import json
+import shutil
 import time
 from pathlib import Path
 from typing import Any
@@ -184,20 +186,34 @@ def geometry(scene: bpy.types.Scene, on: Stage) -> Hemicube:
 
 
 def _begin(folder: Path, head: dict[str, Any]) -> list[dict[str, Any]]:
-    """The tiles to capture: those of an unfinished set of the very same capture, or new ones."""
+    """The tiles to capture: those of the very same capture, left unfinished, or new ones."""
     if (folder / HEADER).is_file():
-        try:
+        with contextlib.suppress(ArtoError):
             there = CaptureSet(folder, unfinished=True).head
-        except ArtoError:
-            there = {}
-        if there.get("key") == head["key"] and not all(t["done"] for t in there["tiles"]):
-            return there["tiles"]
+            if there.get("key") == head["key"]:
+                return there["tiles"]
     try:
-        for old in folder.glob("tile_*.exr"):
-            old.unlink()
+        if folder.exists():
+            shutil.rmtree(folder)
     except OSError as e:
         raise CaptureSetError(f"{folder} cannot be emptied ({e}): choose another folder") from e
     return head["tiles"]
+
+
+def _finish(unfinished: Path, folder: Path) -> None:
+    """Put the complete capture set where the last one is."""
+    old = folder.with_name(folder.name + ".old")
+    try:
+        if folder.exists():
+            folder.replace(old)
+        unfinished.replace(folder)
+        if old.exists():
+            shutil.rmtree(old)
+    except OSError as e:
+        raise CaptureSetError(
+            f"{unfinished} is complete but cannot take the place of {folder} ({e}): close what "
+            "uses that folder and capture again, no render is repeated"
+        ) from e
 
 
 def _check_file(path: Path, images: list[tuple[int, str]]) -> None:
@@ -217,12 +233,13 @@ def _check_file(path: Path, images: list[tuple[int, str]]) -> None:
 def capture(scene: bpy.types.Scene, view_layer: str) -> Steps:
     """Render the basis images of a scene into its capture set; returns the folder.
 
-    A set left unfinished by the same capture is gone on with. Raises SceneError, CaptureSetError,
+    A set left unfinished by the same capture is gone on with; an earlier finished one stays until
+    the new one is complete. Raises SceneError, CaptureSetError,
     ExrError, CancelledError; the scene stays as it is.
     """
     check_scene(scene)
     settings = scene.arto
-    folder = paths.capture_folder(scene)
+    folder = paths.unfinished_capture_folder(scene)
     patterns = pattern_set(settings.patterns)
     region = picture_region(scene)
     with stage(scene, view_layer) as on:
@@ -276,8 +293,9 @@ def capture(scene: bpy.types.Scene, view_layer: str) -> Steps:
                 entry["files"].append(name)
             entry["done"] = True
             write_header(folder, head)
+    _finish(folder, paths.capture_folder(scene))
     yield Progress(1.0, f"captured {len(hemicube)} patches in {total} renders")
-    return folder
+    return paths.capture_folder(scene)
 
 
 def _render(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..core.capture_set import CaptureSet
+from ..core.capture_set import HEADER, CaptureSet
 from ..core.fit import fit as fit_captured
 from . import paths
 from .capture import check_same_shot
@@ -17,7 +17,11 @@ def fit(scene: bpy.types.Scene) -> Steps:
     Raises CaptureSetError, FieldError, PatternError; a field that was there stays until the new
     one is complete.
     """
-    captured = CaptureSet(paths.capture_folder(scene))
+    folder = paths.capture_folder(scene)
+    unfinished = paths.unfinished_capture_folder(scene)
+    if not (folder / HEADER).is_file() and (unfinished / HEADER).is_file():
+        folder = unfinished  # which says how far it is
+    captured = CaptureSet(folder)
     check_same_shot(scene, captured.head, "the capture set")
     folder = paths.field_folder(scene)
     about = {"shot": captured.head.get("shot", {})}

@@ -30,6 +30,11 @@ def capture_folder(scene: bpy.types.Scene) -> Path:
     return root(scene) / "capture"
 
 
+def unfinished_capture_folder(scene: bpy.types.Scene) -> Path:
+    """Where a capture grows. It takes the place of the finished one only when it is complete."""
+    return root(scene) / "capture.unfinished"
+
+
 def field_folder(scene: bpy.types.Scene) -> Path:
     return root(scene) / "field"
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from .errors import FieldError
 from .moments import UNIFORM_VARIANCE, Moments
-from .patterns import ONE, UU, VV, PatternSet, U, V
+from .patterns import ONE, PatternSet
 from .supports import BOX, LINEAR, NOTHING, PER_CHANNEL, SUPPORTS, WHOLE, Support
 
 SEARCH = "search"
@@ -147,13 +147,6 @@ def automatic(moments: Moments, hits: NDArray, least: NDArray) -> NDArray[np.uin
     codes = np.where(centred, WHOLE.code, LINEAR.code)
     codes = np.where(narrow & box, BOX.code, codes)
     return np.where((size > 0) & (size >= least), codes, NOTHING).astype(np.uint8)
-
-
-def needs_of(choice: str) -> tuple[int, ...]:
-    """The moments that a choice looks at."""
-    if choice in SUPPORTS:
-        return SUPPORTS[choice].needs
-    return (ONE, U, UU, V, VV)
 
 
 def choose(

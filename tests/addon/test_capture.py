@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 import json
-import stat
 import subprocess
-from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import capture, paths, work
+from arto.arto_addon import capture, fit, paths, work
 from arto.core import exr
-from arto.core.capture_set import GROUP, CaptureSet
+from arto.core.capture_set import GROUP
 from arto.core.errors import ArtoError, CancelledError, CaptureSetError, SceneError
 from scene_tools import HEIGHT, WIDTH, captured, cycles, differences, small_scene, snapshot
 
@@ -99,14 +98,13 @@ def test_tiles_make_the_same_picture(tmp_path):
 
 
 def test_tiles_fit_the_budget(scene):
-    region = capture.picture_region(scene)
-    row = region.width * (480 + capture.OTHER_PASSES) * capture.BYTES_PER_PASS
-    scene_rows = capture.tiles_of(type(region)(0, 0, 2000, 1000), 480, 256)
-    assert sum(t.height for t in scene_rows) == 1000
-    assert all(t.height * 2000 * 488 * 24 <= 256 * 2**20 for t in scene_rows)
-    assert row > 0
+    region = type(capture.picture_region(scene))
+    tiles = capture.tiles_of(region(5, 3, 2000, 1000), 480, 256)
+    assert tiles[0].y == 3 and sum(t.height for t in tiles) == 1000
+    assert all(a.y + a.height == b.y for a, b in itertools.pairwise(tiles))
+    assert all(t.height * 2000 * 488 * 24 <= 256 * 2**20 for t in tiles)
     with pytest.raises(SceneError, match="memory budget"):
-        capture.tiles_of(type(region)(0, 0, 100000, 10), 9000, 16)
+        capture.tiles_of(region(0, 0, 100000, 10), 9000, 16)
 
 
 def test_render_region(tmp_path):
@@ -144,14 +142,15 @@ def test_cancelled_scene_is_as_before_and_goes_on(tmp_path, monkeypatch):
     with pytest.raises(CancelledError, match="run it again"):
         _interrupt_after(capture.capture(scene, "ViewLayer"), 2)
     assert not differences(before, snapshot())
-    folder = paths.capture_folder(scene)
+    folder = paths.unfinished_capture_folder(scene)
     head = json.loads((folder / "capture.json").read_text())
     assert [t["done"] for t in head["tiles"]] == [True, True, False]
     with pytest.raises(CaptureSetError, match="2 of 3 tiles"):
-        CaptureSet(folder)
+        work.run(fit.fit(scene))
     kept = (folder / "tile_0001.exr").stat().st_mtime_ns
     there = captured(scene)
-    assert (folder / "tile_0001.exr").stat().st_mtime_ns == kept
+    assert (there.folder / "tile_0001.exr").stat().st_mtime_ns == kept
+    assert not folder.exists()
     assert len([there.read(i) for i in range(3)]) == 3
     assert not differences(before, snapshot())
 
@@ -163,10 +162,26 @@ def test_another_capture_does_not_go_on_with_it(tmp_path, monkeypatch):
     )
     with pytest.raises(CancelledError):
         _interrupt_after(capture.capture(scene, "ViewLayer"), 1)
-    old = (paths.capture_folder(scene) / "tile_0000.exr").stat().st_mtime_ns
+    unfinished = paths.unfinished_capture_folder(scene)
+    old = (unfinished / "tile_0000.exr").stat().st_mtime_ns
     scene.arto.samples += 1
     there = captured(scene)
     assert (there.folder / "tile_0000.exr").stat().st_mtime_ns != old
+
+
+def test_cancelled_capture_keeps_the_finished_one(tmp_path):
+    """Capture again and stop: the set that was there is as it was, and can be fitted."""
+    scene = small_scene(tmp_path)
+    there = captured(scene)
+    before = {p.name: p.read_bytes() for p in there.folder.iterdir()}
+    scene.arto.samples += 1
+    with pytest.raises(CancelledError):
+        _interrupt_after(capture.capture(scene, "ViewLayer"), 0)
+    assert {p.name: p.read_bytes() for p in there.folder.iterdir()} == before
+    work.run(fit.fit(scene))
+    # the new one takes its place, and nothing is left beside it
+    assert captured(scene).head["samples"] == scene.arto.samples
+    assert sorted(p.name for p in there.folder.parent.iterdir()) == ["capture", "field"]
 
 
 def test_finished_capture_leaves_the_scene_as_before(tmp_path):
@@ -250,21 +265,31 @@ def test_unwritable_folder(scene, tmp_path):
     assert not differences(before, snapshot())
 
 
-def test_near_hemicube_may_be_chosen(tmp_path):
-    """A near hemicube lights the floor beside a patch more than the one across."""
-    scene = small_scene(tmp_path)
-    scene.arto.far, scene.arto.size = False, 6.0
-    near = captured(scene)
-    assert near.hemicube.size == 6.0
-    assert near.head["hemicube"]["size"] == 6.0
+def test_near_hemicube_lights_what_is_near(tmp_path):
+    """The left face of a near hemicube lights the left end of the floor more than the right one; a
+    far one lights both ends alike."""
+    ratios = []
+    for far in (True, False):
+        scene = small_scene(tmp_path / str(far))
+        for name in ("Matt", "Glossy"):
+            bpy.data.objects.remove(scene.objects[name])
+        scene.arto.far, scene.arto.size, scene.arto.samples = far, 6.0, 256
+        there = captured(scene)
+        assert (there.hemicube.size == 6.0) is not far
+        data = there.read(0)
+        left = data.basis[there.hemicube.face_slice("left").start, 0].sum(axis=-1)
+        floor = data.alpha > 0.999
+        columns = np.nonzero(floor)[1]
+        low, high = np.percentile(columns, (20, 80))
+        column = np.arange(WIDTH)[None, :]
+        ratios.append(left[floor & (column < low)].mean() / left[floor & (column > high)].mean())
+    assert ratios[0] == pytest.approx(1, abs=0.15)
+    assert ratios[1] > 1.5
 
 
-def test_files_are_ordinary(tmp_path):
-    scene = small_scene(tmp_path)
-    there = captured(scene)
-    mode = (there.folder / there.files[0][0]).stat().st_mode
-    assert mode & stat.S_IRUSR
-    assert not list(Path(there.folder).glob("*.part"))
+def test_no_half_files_are_left(tmp_path):
+    there = captured(small_scene(tmp_path))
+    assert sorted(p.name for p in there.folder.iterdir()) == ["capture.json", "tile_0000.exr"]
 
 
 def test_grain_shows_the_noise(tmp_path):
