@@ -262,6 +262,7 @@ def capture(scene: bpy.types.Scene, view_layer: str) -> Steps:
             seed=settings.seed,
             route=settings.route,
             grain=grain,
+            far=settings.far,
             blender=bpy.app.version_string,
             colour_space=bpy.data.colorspace.working_space,
             film_transparent=scene.render.film_transparent,

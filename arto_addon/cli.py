@@ -49,6 +49,9 @@ def _parser() -> argparse.ArgumentParser:
 
     job = jobs.add_parser("relight", parents=[files], help="relight with the scene's world")
     job.add_argument("--own-lamps", type=float, help="how much of the scene's own lamps to add")
+    lamps = "a render of their own for the suns and lamps of the world"
+    job.add_argument("--lamps", action=argparse.BooleanOptionalAction, default=None, help=lamps)
+    job.add_argument("--lamp-samples", type=int)
     job.add_argument("--environment-width", type=int)
     job.add_argument("--denoise", action=argparse.BooleanOptionalAction, default=None)
     job.add_argument("--output", help="the EXR to write (default: beside the .blend)")

@@ -27,7 +27,7 @@ def available() -> bool:
     if not _available:
         rng = np.random.default_rng(0)
         noisy = rng.exponential(size=(64, 64, 3)).astype(np.float32)
-        _available.append(bool(denoise(noisy, {}).std() < 0.5 * noisy.std()))
+        _available.append(bool(denoise({}, noisy).std() < 0.5 * noisy.std()))
     return _available[0]
 
 
@@ -37,12 +37,24 @@ def guides_of(field: Field) -> dict[str, NDArray]:
     return {n: field.layer(n) for n in names if field.has_layer(n)}
 
 
-def denoise(picture: NDArray[np.float32], guides: dict[str, NDArray]) -> NDArray[np.float32]:
-    """A denoised picture (H, W, 3), scene-linear.
+def _sum(tree: Any, one: Any, other: Any) -> Any:
+    """The sum of two colours in a compositor tree."""
+    node = tree.nodes.new("ShaderNodeMix")
+    node.data_type, node.blend_type, node.clamp_factor = "RGBA", "ADD", False
+    sockets = [s for s in node.inputs if s.enabled]
+    sockets[0].default_value = 1.0
+    tree.links.new(one, sockets[1])
+    tree.links.new(other, sockets[2])
+    return next(s for s in node.outputs if s.enabled)
 
+
+def denoise(guides: dict[str, NDArray], *pictures: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The sum of pictures (H, W, 3), scene-linear, each denoised by itself.
+
+    Parts of a picture with noise of different size are cleaned better one by one.
     guides: `albedo` and `normal`, (H, W, 3), or neither.
     """
-    height, width = picture.shape[:2]
+    height, width = pictures[0].shape[:2]
     studio = bpy.data.scenes.new("ARTO Denoise")
     made: list[Any] = [studio]
     with tempfile.TemporaryDirectory() as folder:
@@ -50,24 +62,33 @@ def denoise(picture: NDArray[np.float32], guides: dict[str, NDArray]) -> NDArray
             tree = bpy.data.node_groups.new("ARTO Denoise", "CompositorNodeTree")
             made.append(tree)
             tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
-            node = tree.nodes.new("CompositorNodeDenoise")
-            node.inputs["HDR"].default_value = True
-            layers = {"Image": picture}
-            if {"albedo", "normal"} <= guides.keys():
-                layers |= {"Albedo": guides["albedo"], "Normal": guides["normal"]}
-            for name, pixels in layers.items():
+
+            def source(name: str, pixels: NDArray, space: str) -> Any:
                 path = Path(folder) / f"{name}.exr"
                 exr.write(path, {"": pixels})
                 image = bpy.data.images.load(str(path))
                 made.append(image)
-                image.colorspace_settings.name = (
-                    bpy.data.colorspace.working_space if name == "Image" else "Non-Color"
-                )
-                source = tree.nodes.new("CompositorNodeImage")
-                source.image = image
-                tree.links.new(source.outputs["Image"], node.inputs[name])
+                image.colorspace_settings.name = space
+                node = tree.nodes.new("CompositorNodeImage")
+                node.image = image
+                return node.outputs["Image"]
+
+            steer = {}
+            if {"albedo", "normal"} <= guides.keys():
+                steer = {
+                    "Albedo": source("albedo", guides["albedo"], "Non-Color"),
+                    "Normal": source("normal", guides["normal"], "Non-Color"),
+                }
+            total = None
+            for i, picture in enumerate(pictures):
+                node = tree.nodes.new("CompositorNodeDenoise")
+                node.inputs["HDR"].default_value = True
+                noisy = source(f"picture{i}", picture, bpy.data.colorspace.working_space)
+                for name, socket in {"Image": noisy, **steer}.items():
+                    tree.links.new(socket, node.inputs[name])
+                total = node.outputs[0] if total is None else _sum(tree, total, node.outputs[0])
             out = tree.nodes.new("NodeGroupOutput")
-            tree.links.new(node.outputs[0], out.inputs[0])
+            tree.links.new(total, out.inputs[0])
             studio.compositing_node_group = tree
             render = studio.render
             render.engine = "CYCLES"

@@ -40,6 +40,10 @@ class ARTO_PT_main(_Panel, bpy.types.Panel):
         column.operator("arto.fit", icon="MOD_LATTICE")
         column.separator()
         column.prop(settings, "own_lamps")
+        column.prop(settings, "lamps")
+        sub = column.column()
+        sub.active = settings.lamps
+        sub.prop(settings, "lamp_samples")
         column.prop(settings, "denoise")
         column.operator("arto.relight", icon="WORLD")
 

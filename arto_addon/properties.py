@@ -21,6 +21,7 @@ from ..core.patterns import PATTERN_SETS
 _PATTERN_TEXT = {
     "moments": ("1, u, u², v, v²", "Five patterns that identify a box"),
     "moments_uv": ("1, u, u², v, v², uv", "Six patterns that also show a tilt"),
+    "linear": ("1, u, v", "Three patterns that show where in a patch the light comes from"),
     "paper": ("Paper's nine", "White, four diagonal gradients and their inverses"),
     "white": ("White only", "One pattern: a reflection coefficient and no support"),
 }
@@ -172,6 +173,20 @@ class ArtoSettings(bpy.types.PropertyGroup):
         description="Denoise the relit picture with Open Image Denoise, steered by the captured "
         "albedo and normal",
         default=True,
+    )
+    lamps: BoolProperty(
+        name="Render Lamps",
+        description="Cut suns and lamps out of the world and render their light by itself, "
+        "quickly; the field brings the rest. Only where the world has any",
+        default=True,
+    )
+    lamp_samples: IntProperty(
+        name="Lamp Samples",
+        description="Samples of that render for a world that is all lamps; for one where they have "
+        "a part of the light, that part of the samples",
+        min=1,
+        soft_max=256,
+        default=32,
     )
     environment_width: IntProperty(
         name="World Width",

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import math
 import time
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.field import Field
+from ..core.lamps import split
 from ..core.light import PatchLight
 from ..core.relight import over
 from ..core.relight import relight as relight_field
 from . import denoise, paths, plate
 from .capture import check_same_shot
+from .lamps import lamp_light
 from .work import Progress, Steps
 from .world import background, bake, check_world
+
+# Fewer samples of the lamps than this have no time to smooth an edge.
+LEAST_SAMPLES = 4
 
 
 def relight(scene: bpy.types.Scene) -> Steps:
@@ -40,23 +47,39 @@ def relight(scene: bpy.types.Scene) -> Steps:
     yield Progress(0.0, "bringing the world to an environment map")
     environment = bake(scene, settings.environment_width)
     lap("world")
-    yield Progress(0.4, "bringing the environment to the patches")
+    parts: list[NDArray[np.float32]] = []
+    lamps = "no"
+    if settings.lamps:
+        found = split(environment, None if field.hemicube.closed else field.hemicube)
+        if found.worth and not field.about.get("far", True):
+            lamps = "no: lamps at infinity would not stand where a near hemicube has them"
+            yield Progress(0.3, f"the world's lamps: {lamps}")
+        elif found.worth:
+            samples = max(LEAST_SAMPLES, math.ceil(settings.lamp_samples * found.share))
+            lamps = f"{found.share:.0%} of the world's light, {samples} samples"
+            yield Progress(0.2, f"the world's lamps: {lamps}")
+            parts.append((yield from lamp_light(scene, field, found.lamps, samples, 0.3)))
+            environment = found.rest
+        lap("lamps")
+    yield Progress(0.5, "bringing the environment to the patches")
     light = PatchLight(environment, field.hemicube)
     lap("light")
     yield Progress(0.6, "relighting")
     picture = relight_field(field, light, settings.own_lamps)
+    parts.append(picture[..., :3])
     lap("relight")
     denoised = "no"
     if settings.denoise:
         yield Progress(0.7, "denoising")
         if denoise.available():
-            picture[..., :3] = denoise.denoise(picture[..., :3], denoise.guides_of(field))
+            parts = [denoise.denoise(denoise.guides_of(field), *parts)]
             denoised = "Open Image Denoise"
         else:
             # said here, in the file's header and in the last line
             denoised = "no: this Blender was built without Open Image Denoise"
             yield Progress(0.7, f"denoising: {denoised}")
         lap("denoise")
+    picture[..., :3] = sum(parts)
     # a plane laid through a sun beside darkness undershoots; a picture has no negative light
     np.maximum(picture, 0, out=picture)
     if not scene.render.film_transparent:
@@ -65,7 +88,8 @@ def relight(scene: bpy.types.Scene) -> Steps:
         lap("background")
     yield Progress(0.9, f"writing {path}")
     world = scene.world.name if scene.world else ""
-    plate.write(path, picture, {"scene": scene.name, "world": world, "denoised": denoised})
+    about = {"scene": scene.name, "world": world, "denoised": denoised, "lamps": lamps}
+    plate.write(path, picture, about)
     plate.wire(scene, plate.node_group(plate.show(path)))
     lap("write")
     say = f" (denoised: {denoised})" if settings.denoise else ""

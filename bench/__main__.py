@@ -38,18 +38,55 @@ def _stability(options: argparse.Namespace) -> None:
 
 
 def _models(options: argparse.Namespace) -> None:
-    from . import scenes
+    from . import scenes, worlds
     from .models import models, table
 
     rows = models(
         options.json,
         options.scenes or list(scenes.SCENES),
-        options.hdris or scenes.hdri_names(),
+        options.hdris or worlds.hdri_names(),
         (options.width, options.width * 3 // 4),
         options.samples,
         options.many,
     )
     print(table(rows))
+
+
+def _accuracy(options: argparse.Namespace) -> None:
+    import json as reader
+
+    from . import accuracy_report as report
+    from . import scenes
+    from .accuracy import accuracy, all_worlds
+
+    if options.quick:
+        options.scenes = options.scenes or ["four_spheres", "window"]
+        options.worlds = options.worlds or ["courtyard", "city", "sky35"]
+        options.turns, options.more = [0.0], []
+        options.width, options.time_width, options.many = 64, 96, 256
+    size, time_size = ((w, w * 3 // 4) for w in (options.width, options.time_width))
+    worlds = all_worlds(options.worlds, options.turns)
+    rows = accuracy(
+        options.json,
+        options.scenes or list(scenes.SCENES),
+        worlds,
+        size,
+        time_size,
+        options.samples,
+        options.many,
+        options.more,
+    )
+    print(report.table(rows, options.samples), "\n")
+    print(report.summary(rows, options.samples), "\n")
+    print(report.by_material(rows, options.samples))
+    report.plot(options.plot, rows)
+    times = reader.loads(options.json.with_suffix(".state.json").read_text())["times"]
+    shown = {"four_spheres": "courtyard", "product": "city", "window": "sky35", "soft": "forest"}
+    there = {(r["scene"], r["hdri"]) for r in rows}
+    cases = [(s, w) for s in times for w in worlds if (s, w.label) in there and not w.degrees]
+    picked = [(s, w) for s, w in cases if shown.get(s) == w.name] or cases[:2]
+    report.sheet(options.sheet, picked, times, rows, size, options.samples, options.many)
+    print(f"look at {options.plot} and {options.sheet}")
 
 
 def _figure3(options: argparse.Namespace) -> None:
@@ -105,6 +142,21 @@ def main() -> int:
     c.add_argument("--samples", type=int, default=16384)
     c.add_argument("--many", type=int, default=8192, help="samples of each of two references")
     c.set_defaults(run=_models)
+
+    c = commands.add_parser("accuracy", help="error against time, and what pays off when")
+    c.add_argument("--json", type=Path, default=Path("out/accuracy.json"))
+    c.add_argument("--quick", action="store_true", help="a few minutes: two scenes, three worlds")
+    c.add_argument("--scenes", nargs="+")
+    c.add_argument("--worlds", nargs="+")
+    c.add_argument("--turns", nargs="+", type=float, default=[0.0, 45.0], help="degrees")
+    c.add_argument("--width", type=int, default=96, help="of the pictures for errors")
+    c.add_argument("--time-width", type=int, default=320, help="of the renders for seconds")
+    c.add_argument("--samples", type=int, default=128)
+    c.add_argument("--more", nargs="*", type=int, default=[], help="other samples of ARTO's")
+    c.add_argument("--many", type=int, default=512, help="samples of each of two references")
+    c.add_argument("--plot", type=Path, default=Path("out/accuracy.png"))
+    c.add_argument("--sheet", type=Path, default=Path("out/accuracy_sheet.png"))
+    c.set_defaults(run=_accuracy)
 
     c = commands.add_parser("figure3", help="the paper's figure 3: supports of four pixels")
     c.add_argument("--out", type=Path, default=Path("docs/figure3.png"))

@@ -11,9 +11,10 @@ from arto.core import metrics
 from arto.core.light import PatchLight
 from arto.core.relight import relight
 
-from . import reference, scenes
+from . import scenes
 from .machine import write_rows
 from .models import captured, fitted, truth
+from .worlds import World
 
 SCENE = "colour"
 MATERIALS = {"prism": 1, "coat": 2, "floor": 5}
@@ -81,7 +82,7 @@ def colour(path: Path, size: tuple[int, int], samples: int, many: int) -> list[d
     fields = {"shared": fitted(source, "box"), "separate": fitted(source, "box", separate=True)}
     rows = []
     for hdri in ("courtyard", "interior", "forest"):
-        made, one, two = truth(SCENE, reference.World(hdri), size, many)
+        made, one, two = truth(SCENE, World(hdri), size, many)
         light = PatchLight(bake(made, made.arto.environment_width), source.hemicube)
         mean = (one.rgb + two.rgb) / 2
         for name, field in fields.items():

@@ -17,6 +17,7 @@ from arto.core.field import Field
 
 from . import pictures, reference, scenes
 from .machine import machine
+from .worlds import World
 
 
 def demo(
@@ -35,7 +36,7 @@ def demo(
     settings: other values for `scene.arto`. Returns what goes into `report.json`.
     """
     scene = reference.new_scene(scene_name, *size)
-    world = reference.World(hdri)
+    world = World(hdri)
     world.apply(scene)
     out.mkdir(parents=True, exist_ok=True)
     for name, value in {"samples": samples, **settings}.items():

@@ -12,7 +12,7 @@ from arto.core.supports import BOX
 from . import scenes
 from .models import captured, truth
 from .pictures import display, exposure_for
-from .reference import World
+from .worlds import World
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

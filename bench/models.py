@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from . import reference, scenes
 from .machine import write_rows
+from .worlds import World
 
 OUT = Path("out/models")
 STAGE = "whole 16x16"
@@ -34,8 +35,10 @@ def captured(
     scene_name: str, size: tuple[int, int], samples: int, seed: int = 0, **settings: Any
 ) -> CaptureSet:
     """The capture set of a scene under these settings, kept by content."""
+    made = Path(capture.__file__).parent
+    code = [(made / f"{n}.py").read_text() for n in ("capture", "hemicube_planes", "properties")]
     key = reference.content_key(
-        scene=scene_name, size=size, samples=samples, seed=seed, settings=settings
+        scene=scene_name, size=size, samples=samples, seed=seed, settings=settings, code=code
     )
     folder = OUT / f"{scene_name}_{key}"
     scene = reference.new_scene(scene_name, *size)
@@ -96,7 +99,7 @@ class Methods:
 
 
 def truth(
-    scene_name: str, world: reference.World, size: tuple[int, int], samples: int
+    scene_name: str, world: World, size: tuple[int, int], samples: int
 ) -> tuple[bpy.types.Scene, reference.Picture, reference.Picture]:
     """The scene under the world, and its reference by two seeds."""
     scene = reference.new_scene(scene_name, *size)
@@ -122,7 +125,7 @@ def models(
     for scene_name in scene_names:
         methods = Methods(scene_name, size, samples, 0)
         for hdri in hdris:
-            scene, one, two = truth(scene_name, reference.World(hdri), size, many)
+            scene, one, two = truth(scene_name, World(hdri), size, many)
             environment = bake(scene, scene.arto.environment_width)
             lights = [PatchLight(environment, h) for h in methods.hemicubes]
             mean = (one.rgb + two.rgb) / 2

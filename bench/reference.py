@@ -21,31 +21,10 @@ from arto.arto_addon.stage import float_exr
 from arto.core import exr
 from numpy.typing import NDArray
 
-from . import scenes
+from . import building, hard_scenes, scenes, worlds
+from .worlds import World
 
 CACHE = Path("out/references")
-
-
-@dataclass(frozen=True)
-class World:
-    """A world to light a scene with: one of Blender's HDRIs, turned, or the paper's right side."""
-
-    name: str
-    degrees: float = 0.0
-
-    @property
-    def label(self) -> str:
-        return self.name + (f"+{self.degrees:g}" if self.degrees else "")
-
-    def apply(self, scene: bpy.types.Scene) -> None:
-        if self.name == "right":
-            scenes.set_world_right(scene)
-        elif self.name == "white":
-            scene.world = bpy.data.worlds.new("white")
-            background = scene.world.node_tree.nodes["Background"]
-            background.inputs["Color"].default_value = (1, 1, 1, 1)
-        else:
-            scenes.set_world_hdri(scene, self.name, rotation_degrees=self.degrees)
 
 
 @dataclass(frozen=True)
@@ -70,6 +49,16 @@ def new_scene(name: str, width: int, height: int) -> bpy.types.Scene:
 
 def render(scene: bpy.types.Scene, samples: int, seed: int, denoise: bool = False) -> Picture:
     """Render the scene as it is, with that many samples, transparent, without clamping."""
+    parts, seconds = render_passes(scene, samples, seed, denoise)
+    combined = parts["Combined"]
+    index = np.rint(parts["Object Index"][..., 0]).astype(np.int32)
+    return Picture(combined[..., :3], combined[..., 3], index, seconds)
+
+
+def render_passes(
+    scene: bpy.types.Scene, samples: int, seed: int, denoise: bool = False
+) -> tuple[dict[str, NDArray[np.float32]], float]:
+    """The passes of such a render by name, and its seconds."""
     cycles, settings = scene.cycles, scene.render
     cycles.samples, cycles.seed = samples, seed
     cycles.use_denoising = denoise
@@ -85,18 +74,16 @@ def render(scene: bpy.types.Scene, samples: int, seed: int, denoise: bool = Fals
     begun = time.perf_counter()
     bpy.ops.render.render(write_still=True, scene=scene.name)
     seconds = time.perf_counter() - begun
-    parts = {name.rsplit(".", 1)[-1]: pixels for name, pixels in exr.read(path).items()}
-    combined = parts["Combined"]
-    index = np.rint(parts["Object Index"][..., 0]).astype(np.int32)
-    return Picture(combined[..., :3], combined[..., 3], index, seconds)
+    return {name.rsplit(".", 1)[-1]: pixels for name, pixels in exr.read(path).items()}, seconds
 
 
 def content_key(**decides: Any) -> str:
-    """A name for what these values, the scenes' script and Blender's version decide."""
-    script = Path(scenes.__file__).read_bytes()
+    """A name for what these values, the scripts of scene and world and Blender's version decide."""
     made = inspect.getsourcefile(scenes.SCENES[decides["scene"]])
-    if made and not Path(made).samefile(scenes.__file__):
-        script += Path(made).read_bytes()
+    files = {building.__file__, worlds.__file__, made or ""}
+    if made and not Path(made).samefile(hard_scenes.__file__):
+        files.add(scenes.__file__)  # others may build on what is there
+    script = b"".join(Path(f).read_bytes() for f in sorted(files, key=lambda f: Path(f).name))
     text = json.dumps([bpy.app.version_string, decides], sort_keys=True).encode()
     return hashlib.sha256(script + text).hexdigest()[:20]
 

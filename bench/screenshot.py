@@ -35,7 +35,7 @@ import bpy
 from bench import scenes
 
 scene = scenes.product_shot(width=400, height=300)
-scenes.set_world_hdri(scene, "sunset")
+worlds.set_world_hdri(scene, "sunset")
 bpy.ops.preferences.addon_enable(module="bl_ext.user_default.arto")
 bpy.ops.wm.save_as_mainfile(filepath=sys.argv[-1])
 bpy.ops.arto.build_hemicube()

@@ -189,6 +189,11 @@ class Hemicube:
 
         return corner(x1, y1) - corner(x0, y1) - corner(x1, y0) + corner(x0, y0)
 
+    @property
+    def closed(self) -> bool:
+        """Whether there is a patch in every direction."""
+        return len(self.faces) == len(FACE_NAMES) and not self.half_sides
+
     def parallax_degrees(self, radius: float) -> float:
         """How far the direction to a patch point differs between the centre of the scene and its
         rim: the error of taking a near hemicube for an environment at infinity."""

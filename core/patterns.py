@@ -138,6 +138,7 @@ PATTERN_SETS: dict[str, PatternSet] = {
     for s in (
         _monomial_set("moments", ONE, U, UU, V, VV),
         _monomial_set("moments_uv", ONE, U, UU, V, VV, UV),
+        _monomial_set("linear", ONE, U, V),
         _paper(),
         _monomial_set("white", ONE),
     )

@@ -51,7 +51,7 @@ from bench import scenes
 path, camera = sys.argv[-2:]
 scene = scenes.product_shot(width={WIDTH}, height={HEIGHT})
 bpy.data.objects.remove(bpy.data.objects["bottle"])  # its caustics would need many samples
-scenes.set_world_hdri(scene, "sunset")
+worlds.set_world_hdri(scene, "sunset")
 bpy.ops.preferences.addon_enable(module="bl_ext.user_default.arto")
 scene.arto.patches = 2
 scene.arto.samples = 256

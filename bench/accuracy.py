@@ -1,0 +1,403 @@
+"""Error against time: ARTO, its baselines and re-rendering, on every scene under every world.
+
+Errors are taken in pictures of one size, seconds in renders of another, larger one, where what a
+render costs once (building the scene, the map of a world) no longer hides what a sample costs. Rows
+are written after each world, and a run that was stopped goes on where it was.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import tempfile
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import arto
+import bpy
+import numpy as np
+from arto.arto_addon import capture, denoise, fit, paths, relight, work
+from arto.arto_addon.world import bake
+from arto.core import exr, lamps, matte, metrics
+from arto.core.choice import CHOICES, SEARCH
+from arto.core.environment import Environment
+from arto.core.field import Field
+from arto.core.light import PatchLight
+from arto.core.relight import relight as relight_field
+from numpy.typing import NDArray
+
+from . import reference, scenes, worlds
+from .machine import write_rows
+from .models import MATTE, STAGE, captured, fitted
+from .worlds import World
+
+ARTO, RAW, NO_LAMPS = "arto", "arto, not denoised", "arto, no lamps"
+RENDER, RENDER_DENOISED = "render", "render denoised"
+SAMPLES = (8, 32, 128)  # of the renders that ARTO is held against
+SEED = 3  # theirs; references have 1 and 2
+RENDERS = reference.CACHE.with_name("renders")
+
+
+@dataclass(frozen=True)
+class Times:
+    """Seconds of one scene at the size for times; `a_sample` is what one more sample costs."""
+
+    capture: float
+    capture_a_sample: float
+    fit: float
+    relight: float
+    lamps: float
+    lamps_a_sample: float
+    render: float
+    render_a_sample: float
+    stage: float
+
+    def capture_of(self, samples: float) -> float:
+        """A capture of so many samples."""
+        return self.capture + self.capture_a_sample * samples
+
+    def render_of(self, samples: float) -> float:
+        """A render of so many samples, denoised."""
+        return self.render + self.render_a_sample * samples
+
+    def relight_of(self, lamp_samples: int) -> float:
+        """A relight whose lamps take so many samples, 0 for none."""
+        extra = self.lamps + self.lamps_a_sample * lamp_samples if lamp_samples else 0.0
+        return self.relight + extra
+
+
+def code_key() -> str:
+    """A name for the state of everything that decides ARTO's pictures."""
+    files = sorted(
+        p for d in ("core", "arto_addon") for p in Path(arto.__file__).parent.glob(f"{d}/**/*.py")
+    )
+    return hashlib.sha256(b"".join(p.read_bytes() for p in files)).hexdigest()[:16]
+
+
+def rerendered(scene_name: str, world: World, size: tuple[int, int], samples: int) -> NDArray:
+    """A plain render and the same denoised -> (2, H, W, 3), kept by content."""
+    key = reference.content_key(
+        scene=scene_name, world=world.label, size=size, samples=samples, seed=SEED, both=True
+    )
+    path = RENDERS / f"{scene_name}_{world.label}_{samples}_{key}.npy"
+    if path.is_file():
+        return np.load(path)
+    scene = reference.new_scene(scene_name, *size)
+    world.apply(scene)
+    scene.view_layers[0].cycles.denoising_store_passes = True
+    parts, _ = reference.render_passes(scene, samples, SEED, denoise=True)
+    both = np.stack([parts["Noisy Image"][..., :3], parts["Combined"][..., :3]])
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_suffix(".part.npy")
+    np.save(partial, both)
+    partial.replace(path)
+    return both
+
+
+def seconds_of(work_to_do: Callable[[], Any]) -> float:
+    begun = time.perf_counter()
+    work_to_do()
+    return time.perf_counter() - begun
+
+
+def times(scene_name: str, size: tuple[int, int], samples: int) -> Times:
+    """Measure one scene: ARTO with its default settings, renders of few and of many samples."""
+    scene = reference.new_scene(scene_name, *size)
+    World("city").apply(scene)
+    reference.render(scene, 1, 0)  # the first pays for loading Cycles
+    few, many = (reference.render(scene, s, 0, denoise=True).seconds for s in (4, 36))
+    each = (many - few) / 32
+    with tempfile.TemporaryDirectory() as folder:
+        scene.arto.folder = folder
+        scene.arto.output = str(Path(folder) / "relit.exr")
+        layer = scene.view_layers[0].name
+        taken = []
+        for n in (samples // 4, samples):
+            scene.arto.samples = n
+            taken.append(seconds_of(lambda: work.run(capture.capture(scene, layer))))
+        capture_sample = max((taken[1] - taken[0]) / (samples - samples // 4), 0.0)
+        fitting = seconds_of(lambda: work.run(fit.fit(scene)))
+        scene.arto.lamps = False
+        work.run(relight.relight(scene))
+        relit = seconds_of(lambda: work.run(relight.relight(scene)))
+        scene.arto.lamps = True
+        share = lamps.split(bake(scene, scene.arto.environment_width)).share
+        lit = []
+        for n in (4, 36):
+            scene.arto.lamp_samples = math.ceil(n / share)
+            lit.append(seconds_of(lambda: work.run(relight.relight(scene))))
+        light_sample = max((lit[1] - lit[0]) / 32, 0.0)
+        for name, value in {"patches": 16, "patterns": "white", "grain": False}.items():
+            setattr(scene.arto, name, value)
+        stage = seconds_of(lambda: work.run(capture.capture(scene, layer)))
+    return Times(
+        capture=taken[1] - capture_sample * samples,
+        capture_a_sample=capture_sample,
+        fit=fitting,
+        relight=relit,
+        lamps=max(lit[0] - relit - 4 * light_sample, 0.0),
+        lamps_a_sample=light_sample,
+        render=max(few - 4 * each, 0.0),
+        render_a_sample=each,
+        stage=stage,
+    )
+
+
+class Shot:
+    """One scene, captured and fitted in every way.
+
+    more: other numbers of samples that ARTO, and only ARTO, is captured with.
+    """
+
+    def __init__(
+        self, scene_name: str, size: tuple[int, int], samples: int, more: Iterable[int] = ()
+    ) -> None:
+        self.name, self.size, self.samples = scene_name, size, samples
+        self.folders: dict[int, Path] = {}
+        for n in (samples, *more):
+            self.folders[n] = captured(scene_name, size, n).folder.parents[1].resolve()
+            scene = self.scene(n)
+            work.run(fit.fit(scene))
+        self.fields = {ARTO: Field(paths.field_folder(self.scene(samples)))}
+        rich = captured(scene_name, size, samples, patterns="moments_uv", patches=4)
+        for choice in CHOICES:
+            if choice != SEARCH:  # minutes a scene; `bench models` has it
+                self.fields[choice] = fitted(rich, choice)
+        fine = captured(scene_name, size, samples, patterns="white", patches=16, grain=False)
+        self.fields[STAGE] = fitted(fine, "whole")
+        data = rich.read(0)
+        basis = data.basis.reshape(*data.basis.shape[:2], -1, 3)
+        self.caps = matte.fit(basis, rich.patterns, rich.hemicube)
+        self.cubes = {name: f.hemicube for name, f in self.fields.items()}
+        self.guides = denoise.guides_of(self.fields[ARTO])
+
+    def scene(self, samples: int | None = None) -> bpy.types.Scene:
+        """The scene anew, with the folder of its capture of so many samples."""
+        scene = reference.new_scene(self.name, *self.size)
+        scene.arto.samples = samples or self.samples
+        scene.arto.folder = str(self.folders[scene.arto.samples])
+        return scene
+
+    def arto(
+        self, world: World, samples: int | None = None, **settings: Any
+    ) -> NDArray[np.float32]:
+        """What the add-on's relight operator writes."""
+        scene = self.scene(samples)
+        world.apply(scene)
+        scene.render.film_transparent = True
+        with tempfile.TemporaryDirectory() as folder:
+            for name, value in {"output": str(Path(folder) / "relit.exr"), **settings}.items():
+                setattr(scene.arto, name, value)
+            path, _ = work.run(relight.relight(scene))
+            return exr.read(path)[""][..., :3]
+
+    def pictures(self, world: World, environment: Environment) -> dict[str, NDArray]:
+        """Every method's picture under a world."""
+        out = {RAW: self.arto(world, denoise=False)}
+        lights: dict[Any, PatchLight] = {}
+        for name, field in self.fields.items():
+            cube = self.cubes[name]
+            if cube not in lights:
+                lights[cube] = PatchLight(environment, cube)
+            picture = relight_field(field, lights[cube])[..., :3]
+            if name == ARTO:
+                out[NO_LAMPS] = denoise.denoise(self.guides, picture)
+            else:
+                out[name] = picture
+            if name == STAGE:
+                out[f"{STAGE} denoised"] = denoise.denoise(self.guides, picture)
+            if name == "auto":
+                caps = matte.relight(self.caps, lights[cube])
+                out[MATTE] = caps.reshape(*self.size[::-1], 3)
+        return {name: np.maximum(p, 0) for name, p in out.items()}
+
+    def bytes_of(self, method: str) -> float:
+        base = method.split(",")[0].removesuffix(" denoised")
+        if base == MATTE:
+            return float(matte.BYTES_PER_PIXEL)
+        return self.fields[base].bytes_per_pixel() if base in self.fields else 0.0
+
+
+def shadow_edges(truth: NDArray, guides: dict[str, NDArray], seen: NDArray) -> NDArray[np.bool_]:
+    """Pixels where the light changes and nothing else does: edges of shadows, caustics and mirror
+    images. (H, W), from a reference (denoised here, so that its noise is no edge)."""
+    clean = np.maximum(denoise.denoise(guides, truth.astype(np.float32)), 0)
+    albedo, normal = guides["albedo"], guides["normal"]
+    light = (clean / np.maximum(albedo, 0.05)).sum(axis=-1)
+    light = np.log(light + 0.02 * light[seen].mean())
+    found = np.zeros(seen.shape, bool)
+    for axis in (0, 1):
+        step = np.abs(np.diff(light, axis=axis)) > 0.2
+        same = np.abs(np.diff(albedo, axis=axis)).max(axis=-1) < 0.05
+        same &= np.linalg.norm(np.diff(normal, axis=axis), axis=-1) < 0.2
+        edge = step & same
+        first = [slice(None)] * 2
+        first[axis] = slice(0, -1)
+        second = [slice(None)] * 2
+        second[axis] = slice(1, None)
+        found[tuple(first)] |= edge
+        found[tuple(second)] |= edge
+    return found & seen
+
+
+def flip(picture: NDArray, truth: NDArray) -> float:
+    """HDR-FLIP's mean, 0 to 1."""
+    import flip_evaluator
+
+    return float(flip_evaluator.evaluate(truth, picture, "HDR", computeMeanError=True)[1])
+
+
+def break_even(
+    times: Times, capture: float, error: float, relight: float, rival: dict[int, float]
+) -> int | None:
+    """Relights after which capture and relights cost less than renders of the same error.
+
+    capture: seconds of capture and fit; rival: error of the denoised render by samples. Between them it is a power of the samples; below
+    the last, as many samples as that. None: never, a relight costs more than such a render.
+    """
+    n = np.log(np.array(sorted(rival), float))
+    e = np.minimum.accumulate(np.log([rival[s] for s in sorted(rival)]))
+    need = float(np.exp(np.interp(-math.log(max(error, 1e-9)), -e, n)))
+    saved = times.render_of(need) - relight
+    return math.ceil(capture / saved) if saved > 0 else None
+
+
+def world_rows(
+    shot: Shot, world: World, environment: Environment, many: int, measured: Times
+) -> list[dict[str, Any]]:
+    """The rows of one scene under one world."""
+    made = shot.scene
+    one, two = (
+        reference.reference(shot.name, world, shot.size, many, seed, made) for seed in (1, 2)
+    )
+    truth, seen = (one.rgb + two.rgb) / 2, one.alpha > 0.999
+    edges = shadow_edges(truth, shot.guides, seen)
+    groups = {m: seen & (one.index == i) for m, i in scenes.MATERIALS[shot.name].items()}
+    split = lamps.split(environment)
+    lamp_samples = 0
+    if split.worth:
+        wanted = shot.scene().arto.lamp_samples
+        lamp_samples = max(relight.LEAST_SAMPLES, math.ceil(wanted * split.share))
+    found = [(ARTO, n, np.maximum(shot.arto(world, n), 0)) for n in shot.folders]
+    found += [(n, shot.samples, p) for n, p in shot.pictures(world, environment).items()]
+    for samples in SAMPLES:
+        raw, clean = rerendered(shot.name, world, shot.size, samples)
+        found += [(RENDER, samples, raw), (RENDER_DENOISED, samples, clean)]
+    rows = []
+    for method, samples, picture in found:
+        is_render = method in (RENDER, RENDER_DENOISED)
+        error = metrics.relative_error(picture, truth, seen).mean(axis=-1)
+        both = metrics.relative_squares(picture, one.rgb, two.rgb, seen).mean(axis=-1)
+        cost = {"capture": 0.0, "fit": 0.0, "relight": measured.render_of(samples)}
+        if not is_render:
+            lit = lamp_samples if method in (ARTO, RAW) else 0
+            whole = method.startswith(STAGE)
+            cost = {
+                "capture": measured.stage if whole else measured.capture_of(samples),
+                "fit": measured.fit,
+                "relight": measured.relight_of(lit),
+            }
+        behind = np.where(seen[..., None], picture, truth).astype(np.float32)
+        rows.append(
+            {
+                "scene": shot.name,
+                "hdri": world.label,
+                "method": method,
+                "samples": samples,
+                "mean_relative_error": float(error.mean()),
+                "noise_floor": metrics.mean_relative_error(one.rgb, two.rgb, seen),
+                "p95": float(np.percentile(error, 95)),
+                "p99": float(np.percentile(error, 99)),
+                "relmse": float(both.mean()),
+                "relmse_trimmed": metrics.trimmed_mean(both),
+                "flip": flip(behind, truth.astype(np.float32)),
+                "by_material": {
+                    m: metrics.mean_relative_error(picture, truth, here)
+                    for m, here in groups.items()
+                },
+                "shadow_edge": metrics.mean_relative_error(picture, truth, edges)
+                if edges.any()
+                else None,
+                "lamp_share": split.share,
+                "lamp_samples": lamp_samples if method in (ARTO, RAW) else 0,
+                "bytes_per_pixel": 0.0 if is_render else shot.bytes_of(method),
+                "capture_seconds": cost["capture"],
+                "fit_seconds": cost["fit"],
+                "relight_seconds": cost["relight"],
+                "plain_render_seconds": measured.render_of(shot.samples),
+            }
+        )
+    rival = {r["samples"]: r["mean_relative_error"] for r in rows if r["method"] == RENDER_DENOISED}
+    for row in rows:
+        if row["method"] in (ARTO, RAW, NO_LAMPS):
+            error, relit = row["mean_relative_error"], row["relight_seconds"]
+            once = row["capture_seconds"] + row["fit_seconds"]
+            row["break_even"] = break_even(measured, once, error, relit, rival)
+    return rows
+
+
+def accuracy(
+    out: Path,
+    scene_names: Iterable[str],
+    world_list: Iterable[World],
+    size: tuple[int, int],
+    time_size: tuple[int, int],
+    samples: int,
+    many: int,
+    more: Iterable[int] = (),
+) -> list[dict[str, Any]]:
+    """All rows; those that `out` holds of the same code and options are kept."""
+    more = list(more)
+    setup = {
+        "size": size,
+        "time": time_size,
+        "samples": [samples, *more],
+        "many": many,
+        "code": code_key(),
+    }
+    state = out.with_suffix(".state.json")
+    text = json.dumps(setup)
+    there = json.loads(state.read_text()) if state.is_file() else {}
+    if there.get("setup") != text:
+        there = {"setup": text, "rows": [], "times": {}}
+    rows: list[dict[str, Any]] = there["rows"]
+    done = {(r["scene"], r["hdri"]) for r in rows}
+    maps: dict[World, Environment] = {}
+    world_list = list(world_list)
+
+    def keep() -> None:
+        state.parent.mkdir(parents=True, exist_ok=True)
+        partial = state.with_suffix(".part")
+        partial.write_text(json.dumps(there))
+        partial.replace(state)
+        write_rows(out, rows)
+
+    for scene_name in scene_names:
+        missing = [w for w in world_list if (scene_name, w.label) not in done]
+        if not missing:
+            continue
+        if scene_name not in there["times"]:
+            there["times"][scene_name] = asdict(times(scene_name, time_size, samples))
+            keep()
+        measured = Times(**there["times"][scene_name])
+        shot = Shot(scene_name, size, samples, more)
+        for world in missing:
+            if world not in maps:
+                scene = shot.scene()
+                world.apply(scene)
+                maps[world] = bake(scene, scene.arto.environment_width)
+            rows += world_rows(shot, world, maps[world], many, measured)
+            keep()
+            print(f"{scene_name} {world.label} done", flush=True)
+    return rows
+
+
+def all_worlds(
+    names: Iterable[str] | None = None, turns: Iterable[float] = (0.0, 45.0)
+) -> list[World]:
+    """Every world, first as it is, then turned."""
+    return [World(n, t) for t in turns for n in (names or worlds.world_names())]

@@ -1,0 +1,80 @@
+"""Lamps of an environment: suns, windows and softboxes, cut out of the map around them.
+
+One patch holds a whole sun, and no filter on a patch shows its shadows. What outshines the rest of
+the map by far is therefore split off, so that its light can be brought to the picture by other
+means (a render of just that light), while the rest stays light that patches resolve well.
+
+The cut is on radiance: a texel keeps what it has up to a level, and the lamps take what is above
+it. The two maps add up to the whole, texel by texel, so no energy is lost or made.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .environment import Environment, sample_directions
+from .hemicube import Hemicube
+
+# How many times brighter than the rest of the map, on average, a lamp is.
+CONTRAST = 20.0
+# The share of all light from which on lamps are worth a render of their own.
+WORTH = 0.05
+_STEPS = 60
+
+
+@dataclass(frozen=True)
+class Split:
+    """rest + lamps is the environment; share: of all light, how much the lamps have, 0 to 1."""
+
+    rest: Environment
+    lamps: Environment
+    share: float
+
+    @property
+    def worth(self) -> bool:
+        """Whether the lamps have enough light to be treated by themselves."""
+        return self.share >= WORTH
+
+
+def split(
+    environment: Environment, hemicube: Hemicube | None = None, contrast: float = CONTRAST
+) -> Split:
+    """Cut the lamps out of an environment map.
+
+    hemicube: where given, light from directions without a patch is no light: it is neither lamp nor
+    counted.
+
+    The level of the cut is `contrast` times the mean radiance of what stays: the level for which
+    that is true is found by cutting again, from the top, until nothing changes. What covers more
+    than 1/contrast of the sphere is no lamp, however bright. Turning the map or changing its
+    exposure changes nothing else.
+    """
+    image = environment.image
+    radiance = np.maximum(image.sum(axis=-1, dtype=np.float64), 0)
+    if hemicube is not None:
+        radiance *= _covered(hemicube, *radiance.shape)
+    weight = environment.row_solid_angles[:, None] / (4 * np.pi)
+    total = float((radiance * weight).sum())
+    level = np.inf
+    for _ in range(_STEPS):
+        lower = contrast * float((np.minimum(radiance, level) * weight).sum())
+        if lower >= level * (1 - 1e-6):
+            break
+        level = lower
+    above = np.maximum(radiance - level, 0)
+    taken = np.divide(above, radiance, out=np.zeros_like(radiance), where=radiance > 0)
+    lamps = (image * taken[..., None]).astype(np.float32)
+    share = float((above * weight).sum()) / total if total > 0 else 0.0
+    return Split(Environment(image - lamps), Environment(lamps), share)
+
+
+def _covered(hemicube: Hemicube, height: int, width: int) -> NDArray[np.bool_]:
+    """Which texels of a map lie in the direction of a patch -> (height, width)."""
+    azimuth, latitude, _ = sample_directions(height, width, 1)
+    d = np.empty((height, width, 3))
+    d[..., :2] = np.cos(latitude)[:, None, None] * azimuth
+    d[..., 2] = np.sin(latitude)[:, None]
+    return hemicube.locate(d)[0] >= 0
