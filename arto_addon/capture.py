@@ -8,6 +8,7 @@ import itertools
 import json
 import shutil
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,12 +31,15 @@ from ..core.hemicube import Hemicube
 from ..core.patterns import PatternSet, pattern_set
 from . import hemicube_planes, paths
 from .bounds import scene_bounds
+from .probe import refined
 from .stage import Stage, float_exr, picture_size, set_region, stage
 from .work import Progress, Render, Steps
 
 # Cycles and Blender's result each hold a group's pass: 3 floats, twice.
 BYTES_PER_PASS = 24
 OTHER_PASSES = 8
+# How many times as many patches as the grid has the probe may hand out.
+ADAPTIVE_SHARE = 2
 
 
 def check_scene(scene: bpy.types.Scene) -> None:
@@ -89,16 +93,15 @@ def tiles_of(region: Region, passes: int, budget_megabytes: int) -> list[Region]
 
 
 def render_plan(
-    route: str, hemicube: Hemicube, patterns: PatternSet, grain: bool
+    route: str, hemicube: Hemicube, names: Sequence[str]
 ) -> list[list[tuple[int, str]]]:
     """The (patch, pattern name) images of each render."""
     k = range(len(hemicube))
     if route == "all":
-        names = [*patterns.patterns, GRAIN] if grain else patterns.patterns
         return [[(i, name) for i in k for name in names]]
     if route == "pattern":
-        return [[(i, name) for i in k] for name in patterns.patterns]
-    return [[(i, name)] for i in k for name in patterns.patterns]
+        return [[(i, name) for i in k] for name in names]
+    return [[(i, name)] for i in k for name in names]
 
 
 def picture_region(scene: bpy.types.Scene) -> Region:
@@ -185,19 +188,22 @@ def geometry(scene: bpy.types.Scene, on: Stage) -> Hemicube:
     return hemicube
 
 
-def _begin(folder: Path, head: dict[str, Any]) -> list[dict[str, Any]]:
-    """The tiles to capture: those of the very same capture, left unfinished, or new ones."""
+def _unfinished(folder: Path, key: str) -> dict[str, Any] | None:
+    """The description of the very same capture, left unfinished, to go on with."""
     if (folder / HEADER).is_file():
         with contextlib.suppress(ArtoError):
             there = CaptureSet(folder, unfinished=True).head
-            if there.get("key") == head["key"]:
-                return there["tiles"]
+            if there.get("key") == key:
+                return there
+    return None
+
+
+def _empty(folder: Path) -> None:
     try:
         if folder.exists():
             shutil.rmtree(folder)
     except OSError as e:
         raise CaptureSetError(f"{folder} cannot be emptied ({e}): choose another folder") from e
-    return head["tiles"]
 
 
 def _finish(unfinished: Path, folder: Path) -> None:
@@ -246,34 +252,42 @@ def capture(scene: bpy.types.Scene, view_layer: str) -> Steps:
         hemicube = geometry(scene, on)
         # between renders the paths differ, and grain would not be theirs
         grain = settings.grain and settings.route == "all"
-        plan = render_plan(settings.route, hemicube, patterns, grain)
-        tiles = tiles_of(region, max(map(len, plan)), settings.memory)
-        prepare(on, layers=len(patterns) + grain)
-        head = describe(
-            hemicube,
-            patterns,
-            picture_size(scene)[::-1],
-            scene=scene.name,
-            file=bpy.data.filepath,
-            view_layer=view_layer,
-            shot=shot(scene),
-            frame=scene.frame_current,
-            samples=settings.samples,
-            seed=settings.seed,
-            route=settings.route,
-            grain=grain,
-            far=settings.far,
-            blender=bpy.app.version_string,
-            colour_space=bpy.data.colorspace.working_space,
-            film_transparent=scene.render.film_transparent,
-            changed=on.changed,
-        )
-        head["tiles"] = [
-            {"region": [t.x, t.y, t.width, t.height], "files": [], "done": False} for t in tiles
-        ]
-        key = json.dumps([head, VERSION], sort_keys=True)
-        head["key"] = hashlib.sha256(key.encode()).hexdigest()[:16]
-        head["tiles"] = _begin(folder, head)
+        names = [*patterns.patterns, *([GRAIN] if grain else [])]
+        prepare(on, layers=len(names))
+        about = {
+            "scene": scene.name,
+            "file": bpy.data.filepath,
+            "view_layer": view_layer,
+            "shot": shot(scene),
+            "frame": scene.frame_current,
+            "samples": settings.samples,
+            "seed": settings.seed,
+            "route": settings.route,
+            "grain": grain,
+            "adaptive": settings.adaptive,
+            "far": settings.far,
+            "blender": bpy.app.version_string,
+            "colour_space": bpy.data.colorspace.working_space,
+            "film_transparent": scene.render.film_transparent,
+            "changed": on.changed,
+        }
+        size = picture_size(scene)[::-1]
+        asked = [describe(hemicube, patterns, size, **about), vars(region), settings.memory]
+        key = hashlib.sha256(json.dumps([asked, VERSION], sort_keys=True).encode()).hexdigest()[:16]
+        head = _unfinished(folder, key)
+        if head is None:
+            if settings.adaptive:
+                hemicube = yield from refined(on, hemicube, ADAPTIVE_SHARE * len(hemicube))
+            plan = render_plan(settings.route, hemicube, names)
+            tiles = tiles_of(region, max(map(len, plan)), settings.memory)
+            head = describe(hemicube, patterns, size, key=key, **about)
+            head["tiles"] = [
+                {"region": [t.x, t.y, t.width, t.height], "files": [], "done": False} for t in tiles
+            ]
+            _empty(folder)
+        hemicube = Hemicube.from_json(head["hemicube"])
+        plan = render_plan(settings.route, hemicube, names)
+        tiles = [Region(*t["region"]) for t in head["tiles"]]
         head["seconds"] = 0.0
         write_header(folder, head)
         total = len(plan) * len(tiles)
@@ -309,24 +323,13 @@ def _render(
     text: str,
 ) -> Steps:
     """One render of some basis images into `path`."""
-    made: list[Any] = []
     partial = path.with_name(path.name + ".part")
-
-    def note(block: Any) -> Any:
-        made.append(block)
-        return on.made(block)
-
-    layer = on.scene.view_layers[0]
-    collection = note(bpy.data.collections.new("ARTO Capture"))
-    on.scene.collection.children.link(collection)
-    hemicube_planes.build(collection, hemicube, patterns, images, note)
-    for k, name in images:
-        layer.lightgroups.add(name=group_name(k, name))
     on.scene.render.filepath = str(partial)
     request = Render(on.scene.name, share, text)
     try:
-        yield request
-        request.check()
+        with hemicube_planes.lit(on, hemicube, patterns, images):
+            yield request
+            request.check()
         if not partial.is_file():
             raise CaptureSetError(
                 f"Blender did not write {path}: make room on the disk, or choose a folder that "
@@ -336,6 +339,3 @@ def _render(
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
-        while layer.lightgroups:
-            layer.lightgroups.remove(layer.lightgroups[0])
-        on.remove(made)

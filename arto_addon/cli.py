@@ -34,6 +34,10 @@ def _parser() -> argparse.ArgumentParser:
     job.add_argument("--preset", choices=sorted(PRESETS))
     job.add_argument("--faces", nargs="+", choices=FACE_NAMES)
     job.add_argument("--patches", type=int, help="patches a side, 1 to 16")
+    adaptive = "patches of the size that the scene needs"
+    job.add_argument(
+        "--adaptive", action=argparse.BooleanOptionalAction, default=None, help=adaptive
+    )
     job.add_argument("--patterns", choices=sorted(PATTERN_SETS))
     job.add_argument("--route", choices=("all", "pattern", "single"), help="how many renders")
     job.add_argument("--samples", type=int)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import bpy
@@ -13,6 +14,7 @@ import numpy as np
 from ..core.capture_set import GRAIN, group_name
 from ..core.hemicube import FACE_NAMES, Hemicube
 from ..core.patterns import PatternSet, pattern_set
+from .stage import Stage
 
 COLLECTION = "ARTO Hemicube"
 FAR = 1000.0
@@ -81,7 +83,8 @@ class _Nodes:
         for coefficient, term in zip(coefficients, terms, strict=True):
             if coefficient:
                 total = self.math("MULTIPLY_ADD", term, float(coefficient), total)
-        return total
+        # on a patch's rim u and v may be a last digit below 0, and no light is negative
+        return self.math("MAXIMUM", total, 0.0)
 
     def grain(self) -> Any:
         """1 on half of the grains, 0 on the others, without order."""
@@ -159,6 +162,32 @@ def build(
         plane = _plane(name, centre + distance * hemicube.corners(k), materials[pattern], made)
         plane.lightgroup = name
         collection.objects.link(plane)
+
+
+@contextmanager
+def lit(
+    on: Stage, hemicube: Hemicube, patterns: PatternSet, images: Iterable[tuple[int, str]]
+) -> Iterator[None]:
+    """The stage with the planes of these images around it and their light groups to write."""
+    made: list[Any] = []
+    images = list(images)
+
+    def note(block: Any) -> Any:
+        made.append(block)
+        return on.made(block)
+
+    layer = on.scene.view_layers[0]
+    try:
+        collection = note(bpy.data.collections.new("ARTO Capture"))
+        on.scene.collection.children.link(collection)
+        build(collection, hemicube, patterns, images, note)
+        for k, name in images:
+            layer.lightgroups.add(name=group_name(k, name))
+        yield
+    finally:
+        while layer.lightgroups:
+            layer.lightgroups.remove(layer.lightgroups[0])
+        on.remove(made)
 
 
 def build_for_artist(scene: bpy.types.Scene, hemicube: Hemicube, radius: float) -> Any:

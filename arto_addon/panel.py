@@ -65,6 +65,7 @@ class ARTO_PT_hemicube(_Panel, bpy.types.Panel):
         sub.active = any(face in settings.faces for face in SIDES)
         sub.prop(settings, "half_sides")
         column.prop(settings, "patches")
+        column.prop(settings, "adaptive")
         column.prop(settings, "align")
         column.prop(settings, "rotation")
         column.prop(settings, "far")

@@ -47,6 +47,9 @@ def _preset_chosen(self: ArtoSettings, context: bpy.types.Context) -> None:
     if self.preset in PRESETS:
         self["faces"] = sum(1 << FACE_NAMES.index(f) for f in PRESETS[self.preset])
         self["half_sides"] = self.preset == "paper"
+        if self.preset == "paper":
+            # half a side cannot be split in four
+            self["adaptive"] = False
 
 
 class ArtoSettings(bpy.types.PropertyGroup):
@@ -77,6 +80,12 @@ class ArtoSettings(bpy.types.PropertyGroup):
         min=1,
         max=16,
         default=4,
+    )
+    adaptive: BoolProperty(
+        name="Adaptive Patches",
+        description="Probe the scene first, split the patches where it tells directions apart, "
+        "and join them where it does not. Off: a regular grid",
+        default=True,
     )
     half_sides: BoolProperty(
         name="Half Height",
@@ -117,7 +126,7 @@ class ArtoSettings(bpy.types.PropertyGroup):
         name="Patterns",
         description="What the patches show",
         items=[(n, *_PATTERN_TEXT.get(n, (_title(n), ""))) for n in PATTERN_SETS],
-        default="moments",
+        default="linear",
     )
     route: EnumProperty(
         name="Renders",
@@ -133,7 +142,7 @@ class ArtoSettings(bpy.types.PropertyGroup):
         name="Capture Noise",
         description="One more pattern that shows how noisy each patch's light is, so that the fit "
         "does not take noise for narrow reflections",
-        default=True,
+        default=False,
     )
     samples: IntProperty(
         name="Samples",

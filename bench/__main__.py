@@ -19,10 +19,11 @@ def _demo(options: argparse.Namespace) -> None:
         options.samples,
         options.many,
         options.picture,
-        patches=options.patches,
-        patterns=options.patterns,
-        support=options.support,
-        grain=options.patterns != "white",
+        **{
+            name: value
+            for name in ("patches", "patterns", "support", "adaptive", "lamps")
+            if (value := getattr(options, name)) is not None
+        },
     )
     print(json.dumps(report, indent=1))
     print(f"look at {options.out / 'comparison.png'}")
@@ -89,6 +90,13 @@ def _accuracy(options: argparse.Namespace) -> None:
     print(f"look at {options.plot} and {options.sheet}")
 
 
+def _noise(options: argparse.Namespace) -> None:
+    from .noise import noise, table
+
+    size = (options.width, options.width * 3 // 4)
+    print(table(noise(options.json, options.scenes, size, options.samples, options.many)))
+
+
 def _figure3(options: argparse.Namespace) -> None:
     from .figure3 import figure3
 
@@ -124,9 +132,11 @@ def main() -> int:
     c.add_argument("--width", type=int, default=160)
     c.add_argument("--samples", type=int, default=128)
     c.add_argument("--many", type=int, default=512, help="samples of each of two references")
-    c.add_argument("--patches", type=int, default=4)
-    c.add_argument("--patterns", default="moments")
-    c.add_argument("--support", default="auto")
+    c.add_argument("--patches", type=int, help="these and the next: the add-on's settings")
+    c.add_argument("--patterns")
+    c.add_argument("--support")
+    c.add_argument("--adaptive", action=argparse.BooleanOptionalAction)
+    c.add_argument("--lamps", action=argparse.BooleanOptionalAction)
     c.add_argument("--picture", type=Path, help="put the comparison there as well")
     c.set_defaults(run=_demo)
 
@@ -157,6 +167,14 @@ def main() -> int:
     c.add_argument("--plot", type=Path, default=Path("out/accuracy.png"))
     c.add_argument("--sheet", type=Path, default=Path("out/accuracy_sheet.png"))
     c.set_defaults(run=_accuracy)
+
+    c = commands.add_parser("noise", help="where to take out the noise of a capture")
+    c.add_argument("--json", type=Path, default=Path("out/noise.json"))
+    c.add_argument("--scenes", nargs="+", default=["four_spheres", "product"])
+    c.add_argument("--width", type=int, default=96)
+    c.add_argument("--samples", type=int, default=128)
+    c.add_argument("--many", type=int, default=512)
+    c.set_defaults(run=_noise)
 
     c = commands.add_parser("figure3", help="the paper's figure 3: supports of four pixels")
     c.add_argument("--out", type=Path, default=Path("docs/figure3.png"))

@@ -131,7 +131,7 @@ def times(scene_name: str, size: tuple[int, int], samples: int) -> Times:
             scene.arto.lamp_samples = math.ceil(n / share)
             lit.append(seconds_of(lambda: work.run(relight.relight(scene))))
         light_sample = max((lit[1] - lit[0]) / 32, 0.0)
-        for name, value in {"patches": 16, "patterns": "white", "grain": False}.items():
+        for name, value in {"patches": 16, "patterns": "white", "adaptive": False}.items():
             setattr(scene.arto, name, value)
         stage = seconds_of(lambda: work.run(capture.capture(scene, layer)))
     return Times(
@@ -163,11 +163,13 @@ class Shot:
             scene = self.scene(n)
             work.run(fit.fit(scene))
         self.fields = {ARTO: Field(paths.field_folder(self.scene(samples)))}
-        rich = captured(scene_name, size, samples, patterns="moments_uv", patches=4)
+        rich = captured(
+            scene_name, size, samples, patterns="moments_uv", grain=True, adaptive=False
+        )
         for choice in CHOICES:
             if choice != SEARCH:  # minutes a scene; `bench models` has it
                 self.fields[choice] = fitted(rich, choice)
-        fine = captured(scene_name, size, samples, patterns="white", patches=16, grain=False)
+        fine = captured(scene_name, size, samples, patterns="white", patches=16, adaptive=False)
         self.fields[STAGE] = fitted(fine, "whole")
         data = rich.read(0)
         basis = data.basis.reshape(*data.basis.shape[:2], -1, 3)
@@ -256,8 +258,9 @@ def break_even(
 ) -> int | None:
     """Relights after which capture and relights cost less than renders of the same error.
 
-    capture: seconds of capture and fit; rival: error of the denoised render by samples. Between them it is a power of the samples; below
-    the last, as many samples as that. None: never, a relight costs more than such a render.
+    capture: seconds of capture and fit; rival: error of the denoised render by samples. Between
+    them it is a power of the samples; below the last, as many samples as that. None: never, a
+    relight costs more than such a render.
     """
     n = np.log(np.array(sorted(rival), float))
     e = np.minimum.accumulate(np.log([rival[s] for s in sorted(rival)]))
@@ -376,13 +379,16 @@ def accuracy(
         partial.replace(state)
         write_rows(out, rows)
 
+    scene_names = list(scene_names)
+    for scene_name in scene_names:  # first, while nothing is in memory
+        if scene_name not in there["times"]:
+            there["times"][scene_name] = asdict(times(scene_name, time_size, samples))
+            keep()
+            print(f"{scene_name}: {there['times'][scene_name]}", flush=True)
     for scene_name in scene_names:
         missing = [w for w in world_list if (scene_name, w.label) not in done]
         if not missing:
             continue
-        if scene_name not in there["times"]:
-            there["times"][scene_name] = asdict(times(scene_name, time_size, samples))
-            keep()
         measured = Times(**there["times"][scene_name])
         shot = Shot(scene_name, size, samples, more)
         for world in missing:

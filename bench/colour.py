@@ -78,7 +78,7 @@ def scene(*, width: int = 320, height: int = 240) -> bpy.types.Scene:
 def colour(path: Path, size: tuple[int, int], samples: int, many: int) -> list[dict[str, Any]]:
     """Shared and separate supports under three HDRIs, by material."""
     scenes.SCENES[SCENE], scenes.MATERIALS[SCENE] = scene, MATERIALS
-    source = captured(SCENE, size, samples)
+    source = captured(SCENE, size, samples, patterns="moments", grain=True, adaptive=False)
     fields = {"shared": fitted(source, "box"), "separate": fitted(source, "box", separate=True)}
     rows = []
     for hdri in ("courtyard", "interior", "forest"):

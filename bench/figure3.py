@@ -37,7 +37,7 @@ def pick(index: np.ndarray, materials: dict[str, int]) -> dict[str, tuple[int, i
 def figure3(path: Path, size: tuple[int, int], samples: int) -> None:
     """Draw the box supports of four pixels; lightness is the coefficient, not linear."""
     name = "four_spheres"
-    source = captured(name, size, samples, patterns="moments_uv")
+    source = captured(name, size, samples, patterns="moments_uv", adaptive=False)
     data = source.read(0)
     _, picture, _ = truth(name, World("courtyard"), size, 256)
     pixels = pick(picture.index, scenes.MATERIALS[name])

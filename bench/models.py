@@ -65,8 +65,12 @@ class Methods:
     """The methods of one scene: each a name and a way to relight, with its costs."""
 
     def __init__(self, scene_name: str, size: tuple[int, int], samples: int, seed: int) -> None:
-        self.rich = captured(scene_name, size, samples, seed, patterns="moments_uv")
-        fine = captured(scene_name, size, samples, seed, patterns="white", patches=16, grain=False)
+        self.rich = captured(
+            scene_name, size, samples, seed, patterns="moments_uv", grain=True, adaptive=False
+        )
+        fine = captured(
+            scene_name, size, samples, seed, patterns="white", patches=16, adaptive=False
+        )
         self.costs: dict[str, dict[str, float]] = {}
         self.ways: dict[str, Callable[[PatchLight, PatchLight], NDArray]] = {}
         self.fields: dict[str, Field] = {}

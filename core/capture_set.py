@@ -108,7 +108,8 @@ class CaptureSet:
         """Read and check one tile. Raises CaptureSetError for whatever would bend the light."""
         region = self.regions[tile]
         shape = (region.height, region.width)
-        basis = np.full((len(self.hemicube), len(self.patterns), *shape, 3), np.nan, np.float32)
+        # what stays unfilled is refused below
+        basis = np.empty((len(self.hemicube), len(self.patterns), *shape, 3), np.float32)
         wanted = {
             (k, name): (k, p)
             for k in range(len(self.hemicube))

@@ -107,7 +107,9 @@ def check(choice: str, patterns: PatternSet) -> None:
         raise FieldError(f"no support model '{choice}': choose one of {', '.join(CHOICES)}")
     if choice == SEARCH:
         patterns.require((ONE,), f"the support model '{choice}'")
-    elif choice in ("auto", STAGE_AND_MATTE):
+    elif choice == "auto":
+        patterns.require(LINEAR.needs, f"the support model '{choice}'")
+    elif choice == STAGE_AND_MATTE:
         patterns.require(BOX.needs, f"the support model '{choice}'")
     else:
         patterns.require(SUPPORTS[choice].needs, f"the support model '{choice}'")
@@ -124,7 +126,7 @@ def _aicc(parameters: int, n: NDArray) -> NDArray:
 def automatic(moments: Moments, hits: NDArray, least: NDArray) -> NDArray[np.uint8]:
     """The model codes (n,) of the smallest models that explain the moments of one patch.
 
-    hits, least: (n,), see `Evidence`.
+    hits, least: (n,), see `Evidence`. Moments without spreads (NaN) leave the box out.
     """
     n = np.maximum(hits, 1e-9)
     size = moments.coefficient.sum(axis=-1, dtype=np.float64)

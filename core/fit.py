@@ -34,7 +34,7 @@ def fit_tile(
     writer = TileWriter(data.region, layers)
     patches = len(data.basis)
     images = data.basis.reshape(patches, len(patterns), -1, 3)
-    coefficients = np.stack([patterns.coefficient(b) for b in images])
+    coefficients = patterns.coefficient(np.moveaxis(images, 1, 0))
     shape = (data.region.height, data.region.width)
     known = choices.evidence(coefficients, shape, samples, data.grain)
     brightest = coefficients.sum(axis=-1).argmax(axis=0)

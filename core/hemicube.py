@@ -1,8 +1,9 @@
 """The hemicube: the cube of light patches around the scene (paper 3 and 4.1).
 
 A face is a square of half-edge 1 at distance 1, in the hemicube's own frame: x right, y away from
-the camera, z up. Each face carries a regular grid of patches; a patch has coordinates u, v in
-[0, 1] that are linear on the face. Patches are numbered face by face, row by row from below.
+the camera, z up. Each face carries a regular grid of patches, or patches of different size (the
+`leaves` of a quadtree, see `refine`); a patch has coordinates u, v in [0, 1] that are linear on the
+face. Patches of a grid are numbered face by face, row by row from below.
 """
 
 from __future__ import annotations
@@ -34,6 +35,10 @@ PRESETS: dict[str, tuple[str, ...]] = {
     "full": FACE_NAMES,
 }
 
+# A patch of a quadtree: face, patches a side if all were of its size, row, column.
+Leaf = tuple[str, int, int, int]
+FINEST = 16
+
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -43,7 +48,9 @@ class Hemicube:
 
     faces: subset of `FACE_NAMES`; patches: patches a side; half_sides: sides only above the
     horizon, with half as many rows; orientation: rotation, own frame to world (rows of a 3x3);
-    centre, size: position and half-edge in scene units.
+    centre, size: position and half-edge in scene units; leaves: patches of different size instead
+    of the grid (`patches` is then only what they were made from). Directions without a leaf have no
+    patch.
     """
 
     faces: tuple[str, ...] = FACE_NAMES
@@ -52,6 +59,7 @@ class Hemicube:
     orientation: tuple[tuple[float, ...], ...] = IDENTITY
     centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
     size: float = 1000.0
+    leaves: tuple[Leaf, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.faces or len(set(self.faces)) != len(self.faces):
@@ -60,6 +68,14 @@ class Hemicube:
             raise HemicubeError(f"no face '{unknown[0]}': choose from {', '.join(FACES)}")
         if not 1 <= self.patches <= 16:
             raise HemicubeError(f"{self.patches} patches a side: choose 1 to 16")
+        for face, n, row, column in self.leaves:
+            size = n in (1, 2, 4, 8, FINEST)
+            if face not in self.faces or not (size and 0 <= row < n and 0 <= column < n):
+                raise HemicubeError(f"no patch {row},{column} of {n}x{n} on the face '{face}'")
+        if self.leaves and (self.table >= 0).sum() != sum(
+            (FINEST // n) ** 2 for _, n, _, _ in self.leaves
+        ):
+            raise HemicubeError("the patches of the hemicube overlap")
         if not (math.isfinite(self.size) and self.size > 0):
             raise HemicubeError(f"a hemicube of size {self.size}: choose a size above 0")
         r = np.array(self.orientation, np.float64)
@@ -83,6 +99,9 @@ class Hemicube:
                 orientation=tuple(tuple(float(x) for x in row) for row in data["orientation"]),
                 centre=tuple(float(x) for x in data["centre"]),  # type: ignore[arg-type]
                 size=float(data["size"]),
+                leaves=tuple(
+                    (str(f), int(n), int(r), int(c)) for f, n, r, c in data.get("leaves", ())
+                ),
             )
         except (KeyError, TypeError, ValueError) as e:
             raise HemicubeError(f"this is not the description of a hemicube: {e!r}") from None
@@ -94,7 +113,9 @@ class Hemicube:
 
     @cached_property
     def grid(self) -> tuple[tuple[str, int, int], ...]:
-        """(face, row, column) of each patch."""
+        """(face, row, column) of each patch; rows and columns of a leaf are those of its size."""
+        if self.leaves:
+            return tuple((face, row, column) for face, _, row, column in self.leaves)
         return tuple(
             (face, row, column)
             for face in self.faces
@@ -106,18 +127,39 @@ class Hemicube:
         return len(self.grid)
 
     def face_slice(self, face: str) -> slice:
-        """Where the patches of `face` stand among all."""
+        """Where the patches of `face` of a grid stand among all."""
         start = next(k for k, (f, _, _) in enumerate(self.grid) if f == face)
         return slice(start, start + self._rows(face) * self.patches)
 
     def patch_name(self, k: int) -> str:
         face, row, column = self.grid[k]
-        return f"{face} {row},{column}"
+        return f"{face} {row},{column}" + (f" of {self.leaves[k][1]}" if self.leaves else "")
+
+    @cached_property
+    def table(self) -> NDArray[np.int32]:
+        """(F, 16, 16): the leaf that each cell of the finest grid lies in, -1 for none."""
+        out = np.full((len(self.faces), FINEST, FINEST), -1, np.int32)
+        for k, (face, n, row, column) in enumerate(self.leaves):
+            s = FINEST // n
+            out[self.faces.index(face), row * s : (row + 1) * s, column * s : (column + 1) * s] = k
+        return out
+
+    @cached_property
+    def sides(self) -> NDArray[np.intp]:
+        """(K,): patches a side if all were of this one's size."""
+        if self.leaves:
+            return np.array([n for _, n, _, _ in self.leaves], np.intp)
+        return np.full(len(self), self.patches, np.intp)
 
     @cached_property
     def extents(self) -> NDArray[np.float64]:
         """(K, 4): x0, x1, y0, y1 of each patch on its face, where the face is [-1, 1]^2."""
         out = np.empty((len(self), 4))
+        for k, (_, n, row, column) in enumerate(self.leaves):
+            edges = np.array((column, column + 1, row, row + 1), np.float64)
+            out[k] = edges * (2 / n) - 1
+        if self.leaves:
+            return out
         for k, (face, row, column) in enumerate(self.grid):
             low = 0.0 if self.half_sides and face in SIDES else -1.0
             rows = self._rows(face)
@@ -167,6 +209,16 @@ class Hemicube:
             own = local[:, hit]
             depth = np.abs(own[axis])
             x, y = (own[int(np.abs(e).argmax())] * e.sum() / depth for e in (eu, ev))
+            if self.leaves:
+                cells = [
+                    np.clip((t + 1) * (FINEST / 2), 0, FINEST - 1).astype(np.int32) for t in (y, x)
+                ]
+                k = self.table[self.faces.index(face)][tuple(cells)]
+                patch[hit] = k
+                x0, x1, y0, y1 = self.extents[k].T
+                u[hit] = (x - x0) / (x1 - x0)
+                v[hit] = (y - y0) / (y1 - y0)
+                continue
             rows = self._rows(face)
             low = 0.0 if self.half_sides and face in SIDES else -1.0
             fu = (x + 1) * (self.patches / 2)
@@ -192,6 +244,8 @@ class Hemicube:
     @property
     def closed(self) -> bool:
         """Whether there is a patch in every direction."""
+        if self.leaves:
+            return len(self.faces) == len(FACE_NAMES) and bool((self.table >= 0).all())
         return len(self.faces) == len(FACE_NAMES) and not self.half_sides
 
     def parallax_degrees(self, radius: float) -> float:

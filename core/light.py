@@ -20,21 +20,23 @@ from .patterns import monomials
 _CACHE: dict[tuple, tuple[NDArray, NDArray]] = {}
 
 
-def default_resolution(hemicube: Hemicube, environment: Environment) -> int:
-    """Bins a patch side: about one texel of the map each, at least 4."""
-    return max(4, environment.image.shape[1] // (4 * hemicube.patches))
+def default_resolution(hemicube: Hemicube, environment: Environment) -> NDArray[np.intp]:
+    """Bins a side of each patch (K,): about one texel of the map each, at least 4."""
+    return np.maximum(4, environment.image.shape[1] // (4 * hemicube.sides))
 
 
-def _bins(hemicube: Hemicube, height: int, width: int, resolution: int) -> tuple[NDArray, NDArray]:
+def _bins(
+    hemicube: Hemicube, height: int, width: int, resolutions: NDArray, offsets: NDArray
+) -> tuple[NDArray, NDArray]:
     """Bin of every sample of a map of that size (-1: no patch), and each sample's solid angle.
 
     The same for every map of a size, so the last one is kept: turning through HDRIs is common.
     """
-    key = (hemicube, height, width, resolution)
+    key = (hemicube, height, width, resolutions.tobytes())
     if key in _CACHE:
         return _CACHE[key]
     # two samples a bin and axis on average; a narrow bin may still stay empty
-    finer = max(1, int(np.ceil(8 * resolution * hemicube.patches / width)))
+    finer = max(1, int(np.ceil(8 * (resolutions * hemicube.sides).max() / width)))
     azimuth, latitude, weight = sample_directions(height, width, finer)
     # float64: float32 moves a sample on a patch's border to the other side
     bins = np.empty((height * finer, width * finer), np.int32)
@@ -45,11 +47,12 @@ def _bins(hemicube: Hemicube, height: int, width: int, resolution: int) -> tuple
         d[..., :2] = np.cos(part)[:, None, None] * azimuth
         d[..., 2] = np.sin(part)[:, None]
         k, u, v = hemicube.locate(d)
-        i = bin_coordinate(hemicube, k, u, 0, resolution).astype(np.int32)
-        j = bin_coordinate(hemicube, k, v, 1, resolution).astype(np.int32)
-        np.clip(i, 0, resolution - 1, out=i)
-        np.clip(j, 0, resolution - 1, out=j)
-        bins[row : row + 64] = np.where(k < 0, -1, (k * resolution + j) * resolution + i)
+        r = resolutions[k].astype(np.int32)
+        i = bin_coordinate(hemicube, k, u, 0, r).astype(np.int32)
+        j = bin_coordinate(hemicube, k, v, 1, r).astype(np.int32)
+        np.clip(i, 0, r - 1, out=i)
+        np.clip(j, 0, r - 1, out=j)
+        bins[row : row + 64] = np.where(k < 0, -1, offsets[k] + j * r + i)
 
     with ThreadPoolExecutor() as pool:
         list(pool.map(fill, range(0, len(latitude), 64)))
@@ -58,7 +61,9 @@ def _bins(hemicube: Hemicube, height: int, width: int, resolution: int) -> tuple
     return _CACHE[key]
 
 
-def bin_coordinate(hemicube: Hemicube, k: NDArray | int, t: NDArray, axis: int, r: int) -> NDArray:
+def bin_coordinate(
+    hemicube: Hemicube, k: NDArray | int, t: NDArray, axis: int, r: NDArray | int
+) -> NDArray:
     """Patch coordinate (0..1) -> bin coordinate (0..r), where bins are equal in angle."""
     low = hemicube.extents[k, 2 * axis]
     high = hemicube.extents[k, 2 * axis + 1]
@@ -69,25 +74,30 @@ def bin_coordinate(hemicube: Hemicube, k: NDArray | int, t: NDArray, axis: int, 
 class PatchLight:
     """An environment map as the patches of a hemicube see it.
 
-    resolution: bins a patch side (default: about one texel of the map). Directions without a patch
-    (a hemicube without a bottom, say) give no light.
+    resolution: bins a patch side, the same for all (default: about one texel of the map each).
+    Directions without a patch (a hemicube without a bottom, say) give no light.
     """
 
     def __init__(
         self, environment: Environment, hemicube: Hemicube, resolution: int | None = None
     ) -> None:
         self.hemicube = hemicube
-        self.resolution = r = resolution or default_resolution(hemicube, environment)
+        if resolution is None:
+            self.resolutions = default_resolution(hemicube, environment)
+        else:
+            self.resolutions = np.full(len(hemicube), resolution, np.intp)
+        # where each patch's bins begin, and its table of sums, which has a row and column more
+        self._offsets = _starts(self.resolutions**2)
+        self._tables = _starts((self.resolutions + 1) ** 2)
         height, width = environment.image.shape[:2]
-        bins, weight = _bins(hemicube, height, width, r)
+        bins, weight = _bins(hemicube, height, width, self.resolutions, self._offsets)
         finer = bins.shape[0] // height
         lit = bins.ravel() >= 0
         index = bins.ravel()[lit]
         solid_angle = np.repeat(weight, bins.shape[1])[lit]
-        size = len(hemicube) * r * r
+        size = int(self._offsets[-1])
         # flux and solid angle side by side: one look-up fetches all four
-        self.binned = np.empty((len(hemicube), r, r, 4))
-        flat = self.binned.reshape(size, 4)
+        self._flat = flat = np.empty((size, 4))
         flat[:, 3] = np.bincount(index, solid_angle, size)
         for c in range(3):
             texels = environment.image[..., c]
@@ -95,31 +105,53 @@ class PatchLight:
             flat[:, c] = np.bincount(index, samples * solid_angle, size)
         self._fill_empty(environment)
         self._polynomials: dict[tuple[int, ...], NDArray[np.float64]] = {}
-        self.sat = np.zeros((len(hemicube), r + 1, r + 1, 4))
-        np.cumsum(self.binned, axis=1, out=self.sat[:, 1:, 1:])
-        np.cumsum(self.sat[:, 1:, 1:], axis=2, out=self.sat[:, 1:, 1:])
+        self._sat = np.zeros((int(self._tables[-1]), 4))
+        for k, r in enumerate(self.resolutions):
+            table = self._sat[self._tables[k] : self._tables[k + 1]].reshape(r + 1, r + 1, 4)
+            np.cumsum(self.bins_of(k), axis=0, out=table[1:, 1:])
+            np.cumsum(table[1:, 1:], axis=1, out=table[1:, 1:])
+
+    @property
+    def resolution(self) -> int:
+        """Bins a patch side, where all patches have the same (ValueError where not)."""
+        if (self.resolutions != self.resolutions[0]).any():
+            raise ValueError("the patches differ in size, and so in bins: see `resolutions`")
+        return int(self.resolutions[0])
+
+    def bins_of(self, k: int) -> NDArray[np.float64]:
+        """(r, r, 4): flux (3) and solid angle of the bins of patch k, row by row of v."""
+        r = self.resolutions[k]
+        return self._flat[self._offsets[k] : self._offsets[k + 1]].reshape(r, r, 4)
+
+    @property
+    def binned(self) -> NDArray[np.float64]:
+        """(K, r, r, 4): `bins_of` all patches, where all have as many."""
+        r = self.resolution
+        return self._flat.reshape(-1, r, r, 4)
 
     def _fill_empty(self, environment: Environment) -> None:
         """A bin that no sample met takes the texel behind its middle, with next to no weight, so
         that a thin box that sees it alone finds light there."""
-        for k in np.unique(np.nonzero(self.binned[..., 3] == 0)[0]):
-            j, i = np.nonzero(self.binned[k, ..., 3] == 0)
-            u, v = self.bin_centres(k)
-            solid_angle = 1e-3 * self.hemicube.solid_angles[k] / self.resolution**2
-            light = environment.at(self.hemicube.directions(k, u[i], v[j]))
-            self.binned[k, j, i, :3] = light * solid_angle
-            self.binned[k, j, i, 3] = solid_angle
+        empty = np.flatnonzero(self._flat[:, 3] == 0)
+        for k in np.unique(np.searchsorted(self._offsets, empty, side="right") - 1):
+            bins = self.bins_of(int(k))
+            j, i = np.nonzero(bins[..., 3] == 0)
+            u, v = self.bin_centres(int(k))
+            solid_angle = 1e-3 * self.hemicube.solid_angles[k] / self.resolutions[k] ** 2
+            light = environment.at(self.hemicube.directions(int(k), u[i], v[j]))
+            bins[j, i, :3] = light * solid_angle
+            bins[j, i, 3] = solid_angle
 
     @cached_property
     def whole(self) -> NDArray[np.float64]:
         """(K, 3): average radiance of each patch."""
-        total = self.sat[:, -1, -1]
+        total = self._sat[self._tables[1:] - 1]
         return total[:, :3] / total[:, 3:]
 
     def bin_centres(self, k: int) -> tuple[NDArray, NDArray]:
         """Patch coordinates of the bins' centres along u and along v -> (r,), (r,)."""
         x = self.hemicube.extents[k]
-        mid = (np.arange(self.resolution) + 0.5) / self.resolution
+        mid = (np.arange(self.resolutions[k]) + 0.5) / self.resolutions[k]
         out = []
         for low, high in ((x[0], x[1]), (x[2], x[3])):
             angle = np.arctan(low) + (np.arctan(high) - np.arctan(low)) * mid
@@ -137,7 +169,7 @@ class PatchLight:
             for k in range(len(self.hemicube)):
                 u, v = self.bin_centres(k)
                 m = monomials(u[None, :], v[:, None])[list(which)].reshape(len(which), -1)
-                light = self.binned[k].reshape(-1, 4)
+                light = self.bins_of(k).reshape(-1, 4)
                 gram = (m * light[:, 3]) @ m.T
                 out[k] = np.linalg.solve(gram, m @ light[:, :3])
             self._polynomials[which] = out
@@ -151,7 +183,7 @@ class PatchLight:
         u0..v1: (n,) edges in patch coordinates, inside [0, 1]. A box thinner than a bin is widened
         to one: the map holds no finer light.
         """
-        r = self.resolution
+        r = self.resolutions[k]
         i0, i1 = _at_least_one_bin(
             bin_coordinate(self.hemicube, k, u0, 0, r),
             bin_coordinate(self.hemicube, k, u1, 0, r),
@@ -170,13 +202,13 @@ class PatchLight:
 
     def _sum_to(self, k: int | NDArray, i: NDArray, j: NDArray) -> NDArray[np.float64]:
         """The table between its entries: bilinear, which is exact for light constant in a bin."""
-        r = self.resolution
-        table = self.sat.reshape(-1, 4)
+        r = self.resolutions[k]
+        table = self._sat
         a = np.minimum(i.astype(np.int64), r - 1)
         b = np.minimum(j.astype(np.int64), r - 1)
         fi = (i - a)[:, None]
         fj = (j - b)[:, None]
-        at = (np.asarray(k, np.int64) * (r + 1) + b) * (r + 1) + a
+        at = self._tables[k] + b * (r + 1) + a
         low = table[at]
         low += fi * (table[at + 1] - low)
         high = table[at + r + 1]
@@ -187,7 +219,12 @@ class PatchLight:
         return low
 
 
-def _at_least_one_bin(low: NDArray, high: NDArray, r: int) -> tuple[NDArray, NDArray]:
+def _starts(sizes: NDArray) -> NDArray[np.intp]:
+    """Where each of some runs of these lengths begins, and where the last one ends (K + 1,)."""
+    return np.concatenate([[0], np.cumsum(sizes)]).astype(np.intp)
+
+
+def _at_least_one_bin(low: NDArray, high: NDArray, r: NDArray | int) -> tuple[NDArray, NDArray]:
     low, high = np.clip(low, 0, r), np.clip(high, 0, r)
     centre = np.clip((low + high) / 2, 0.5, r - 0.5)
     thin = high - low < 1

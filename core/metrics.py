@@ -29,8 +29,8 @@ def relative_squares(
     """(x - a)(x - b) / (ref + 1% of the mean of ref)^2, per pixel and channel.
 
     one, two: independent renders of the same picture, (H, W, 3); ref is their mean. Their noise
-    has no part in the mean of this (which may so be below 0 for a picture better than they are);
-    it is relMSE -> (n, 3) float64 of the pixels inside the mask.
+    has no part in the mean of this but through the weights (which may so be below 0 for a picture
+    better than they are); it is relMSE -> (n, 3) float64 of the pixels inside the mask.
     """
     if mask is None:
         mask = np.ones(picture.shape[:2], bool)

@@ -66,8 +66,9 @@ def small_scene(folder: Path, lamp: bool = False) -> bpy.types.Scene:
     settings.folder = str(folder / "arto")
     settings.output = str(folder / "relit.exr")
     settings.samples, settings.patches = 64, 1
+    settings.patterns, settings.grain, settings.adaptive = "moments", True, False
     # the physics is looked at as it is
-    settings.denoise = False
+    settings.denoise = settings.lamps = False
     return scene
 
 

@@ -142,11 +142,12 @@ def test_codes_are_for_good() -> None:
 def test_a_choice_that_cannot_be() -> None:
     with pytest.raises(FieldError, match="no support model 'gauss': choose one of auto, whole"):
         check("gauss", MOMENTS)
-    for choice in ("auto", "box"):
-        with pytest.raises(PatternError, match="needs the moments u2, v2"):
-            check(choice, pattern_set("paper"))
-    for choice in ("linear", "whole"):
+    with pytest.raises(PatternError, match="needs the moments u2, v2"):
+        check("box", pattern_set("paper"))
+    for choice in ("linear", "whole", "auto"):
         check(choice, pattern_set("paper"))
+    with pytest.raises(PatternError, match="'auto' needs the moments u, v"):
+        check("auto", pattern_set("white"))
     with pytest.raises(PatternError, match="'linear' needs the moments u, v"):
         check("linear", pattern_set("white"))
     check("whole", pattern_set("white"))

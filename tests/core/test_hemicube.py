@@ -15,8 +15,26 @@ from hypothesis import strategies as st
 seeds = st.integers(0, 2**31)
 
 
+def quadtree(rng: np.random.Generator, face: str, n: int = 1, row: int = 0, column: int = 0):
+    """Leaves of a face, split at random."""
+    if n == 16 or rng.random() < 0.4:
+        return [(face, n, row, column)]
+    return [
+        leaf
+        for i in (0, 1)
+        for j in (0, 1)
+        for leaf in quadtree(rng, face, 2 * n, 2 * row + i, 2 * column + j)
+    ]
+
+
 @st.composite
 def hemicubes(draw: st.DrawFn, rotation) -> Hemicube:
+    if draw(st.booleans()):
+        faces = tuple(draw(st.permutations(FACE_NAMES))[: draw(st.integers(1, 6))])
+        rng = np.random.default_rng(draw(seeds))
+        leaves = [leaf for face in faces for leaf in quadtree(rng, face)]
+        turn = rotation(draw(seeds))
+        return Hemicube(faces=faces, orientation=turn, leaves=tuple(leaves))
     return Hemicube(
         faces=tuple(draw(st.permutations(FACE_NAMES))[: draw(st.integers(1, 6))]),
         patches=draw(st.integers(1, 16)),
@@ -227,3 +245,40 @@ def test_parallax() -> None:
     seen = patch - rim
     angle = math.degrees(math.acos(seen @ patch / np.linalg.norm(seen) / np.linalg.norm(patch)))
     assert Hemicube(size=7).parallax_degrees(2) == pytest.approx(angle, rel=1e-9)
+
+
+@given(seed=seeds)
+def test_leaves_are_a_hemicube_like_any_other(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    leaves = tuple(leaf for face in FACE_NAMES for leaf in quadtree(rng, face))
+    cube = Hemicube(leaves=leaves)
+    assert cube.closed and cube.solid_angles.sum() == pytest.approx(4 * np.pi)
+    assert Hemicube.from_json(json.loads(json.dumps(cube.to_json()))) == cube
+    assert [cube.patch_name(k) for k in range(len(cube))][-1].endswith(f"of {leaves[-1][1]}")
+    without = Hemicube(leaves=leaves[1:])
+    assert not without.closed
+    lost = without.locate(cube.directions(0, np.array([0.5]), np.array([0.5])))[0]
+    assert lost.tolist() == [-1]
+
+
+def test_the_grid_as_leaves_is_the_grid() -> None:
+    grid = Hemicube(patches=4)
+    cube = Hemicube(leaves=tuple((f, 4, row, column) for f, row, column in grid.grid))
+    np.testing.assert_array_equal(cube.extents, grid.extents)
+    d = np.random.default_rng(0).normal(size=(1000, 3))
+    for one, two in zip(cube.locate(d), grid.locate(d), strict=True):
+        np.testing.assert_allclose(one, two, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("leaves", "say"),
+    [
+        ((("top", 3, 0, 0),), "no patch 0,0 of 3x3"),
+        ((("top", 2, 2, 0),), "no patch 2,0 of 2x2"),
+        ((("side", 2, 0, 0),), "on the face 'side'"),
+        ((("top", 2, 0, 0), ("top", 4, 1, 1)), "overlap"),
+    ],
+)
+def test_leaves_that_cannot_be(leaves, say: str) -> None:
+    with pytest.raises(HemicubeError, match=say):
+        Hemicube(leaves=leaves)

@@ -1,0 +1,63 @@
+"""The probe: a small and quick capture that shows where a scene needs small patches."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..core import exr
+from ..core.capture_set import GROUP
+from ..core.hemicube import FINEST, Hemicube
+from ..core.patterns import pattern_set
+from ..core.refine import refine
+from . import hemicube_planes
+from .stage import Stage
+from .work import Render, Steps
+
+# Pixels and samples of the probe: its cost is the same for a picture of any size.
+PIXELS = 1728
+SAMPLES = 32
+
+
+def refined(on: Stage, hemicube: Hemicube, most: int) -> Steps:
+    """Render a probe of the prepared stage and refine the hemicube by it -> Hemicube.
+
+    Raises CancelledError, ExrError, HemicubeError; the stage is left as it was.
+    """
+    scene = on.scene
+    render, cycles = scene.render, scene.cycles
+    fine = replace(hemicube, patches=FINEST)
+    patterns = pattern_set("white")
+    images = [(k, "white") for k in range(len(fine))]
+    share = math.sqrt(PIXELS / (render.resolution_x * render.resolution_y))
+    were = {
+        (owner, name): getattr(owner, name)
+        for owner, names in (
+            (render, ("resolution_x", "resolution_y", "resolution_percentage", "use_border")),
+            (cycles, ("samples",)),
+        )
+        for name in names
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            render.resolution_x = max(8, round(render.resolution_x * share))
+            render.resolution_y = max(8, round(render.resolution_y * share))
+            render.resolution_percentage, render.use_border = 100, False
+            cycles.samples = SAMPLES
+            path = Path(folder) / "probe.exr"
+            render.filepath = str(path)
+            with hemicube_planes.lit(on, fine, patterns, images):
+                request = Render(scene.name, 0, f"probing {len(fine)} directions")
+                yield request
+                request.check()
+            found = [(GROUP.search(name), pixels) for name, pixels in exr.read(path).items()]
+            by_patch = {int(match[1]): pixels for match, pixels in found if match}
+            probe = np.stack([by_patch[k] for k in range(len(fine))])
+        finally:
+            for (owner, name), value in were.items():
+                setattr(owner, name, value)
+    return refine(hemicube, probe, SAMPLES, most)

@@ -1,0 +1,68 @@
+"""The probe: patches where the scene needs them, and the same light as with any others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from arto.arto_addon import capture, fit, relight, work
+from arto.core import exr
+from arto.core.errors import HemicubeError
+from scene_tools import captured, cycles, differences, set_colour, small_scene, snapshot
+
+
+def adaptive(folder):
+    scene = small_scene(folder)
+    scene.render.film_transparent = True
+    scene.arto.adaptive, scene.arto.patches = True, 4
+    scene.arto.patterns, scene.arto.grain = "linear", False
+    return scene
+
+
+def test_patches_of_many_sizes_light_the_scene_as_cycles_does(tmp_path):
+    """The floor is opaque: of the light from below little arrives, and few patches stay there.
+    Under white light the plate is Cycles' picture, with the noise of its paths."""
+    scene = adaptive(tmp_path)
+    before = snapshot()
+    there = captured(scene)
+    assert not [d for d in differences(before, snapshot()) if "ARTO" not in d]
+    cube = there.hemicube
+    assert cube.closed and 6 < len(cube) <= 192
+    count = {f: sum(face == f for face, _, _, _ in cube.leaves) for f in cube.faces}
+    assert count["top"] > 4 * count["bottom"]
+    work.run(fit.fit(scene))
+    set_colour(scene, (1, 1, 1))
+    path, _ = work.run(relight.relight(scene))
+    picture = exr.read(path)[""]
+    one, two = (cycles(scene, 64, seed, tmp_path) for seed in (1, 2))
+    seen = one[..., 3] > 0.999
+    noise = np.abs(one - two)[seen].mean()
+    assert np.abs(picture - one)[seen].mean() < 2 * noise
+    assert picture[seen].mean() == pytest.approx(one[seen].mean(), rel=0.01)
+
+
+def test_going_on_does_not_probe_again(tmp_path):
+    scene = adaptive(tmp_path)
+    scene.arto.samples, scene.arto.memory = 4, 16
+    scene.render.resolution_x, scene.render.resolution_y = 80, 60
+    steps = capture.capture(scene, scene.view_layers[0].name)
+    texts = []
+    for step in steps:
+        if isinstance(step, work.Render):
+            texts.append(step.text)
+            if len(texts) == 3:
+                break
+            work.blocking_render(step)
+    steps.close()
+    assert "probing" in texts[0] and "of " in texts[1]
+    again = []
+    work.run(capture.capture(scene, scene.view_layers[0].name), again.append)
+    assert not [s for s in again if "probing" in s.text]
+
+
+def test_half_sides_cannot_be_refined_and_the_paper_does_not_try(tmp_path):
+    scene = adaptive(tmp_path)
+    scene.arto.half_sides = True
+    with pytest.raises(HemicubeError, match="turn Adaptive Patches off"):
+        captured(scene)
+    scene.arto.preset = "paper"
+    assert not scene.arto.adaptive
