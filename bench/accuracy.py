@@ -262,9 +262,15 @@ def break_even(
     them it is a power of the samples; below the last, as many samples as that. None: never, a
     relight costs more than such a render.
     """
-    n = np.log(np.array(sorted(rival), float))
-    e = np.minimum.accumulate(np.log([rival[s] for s in sorted(rival)]))
-    need = float(np.exp(np.interp(-math.log(max(error, 1e-9)), -e, n)))
+    better: dict[float, int] = {}  # error -> the fewest samples that have it
+    for n in sorted(rival):
+        if not better or rival[n] < min(better):
+            better[rival[n]] = n
+    errors = sorted(better)
+    need = float(max(rival))
+    if error >= errors[0]:
+        at = np.interp(math.log(error), np.log(errors), np.log([better[e] for e in errors]))
+        need = math.exp(at)
     saved = times.render_of(need) - relight
     return math.ceil(capture / saved) if saved > 0 else None
 

@@ -32,7 +32,7 @@ WORK = """
 import sys
 sys.path.insert(0, sys.argv[-2])
 import bpy
-from bench import scenes
+from bench import scenes, worlds
 
 scene = scenes.product_shot(width=400, height=300)
 worlds.set_world_hdri(scene, "sunset")

@@ -46,7 +46,7 @@ MAKE_SCENE = f"""
 import sys
 sys.path.insert(0, {str(ROOT)!r})
 import bpy
-from bench import scenes
+from bench import scenes, worlds
 
 path, camera = sys.argv[-2:]
 scene = scenes.product_shot(width={WIDTH}, height={HEIGHT})
