@@ -31,6 +31,11 @@ def available() -> bool:
     return _available[0]
 
 
+# From so many samples of a capture on, what is left of noise in its guides does no harm
+# (docs/accuracy.md).
+CLEAN_SAMPLES = 64
+
+
 def guides_of(field: Field) -> dict[str, NDArray]:
     """The guides that a field carries, by name."""
     names = ("albedo", "normal")
@@ -48,11 +53,14 @@ def _sum(tree: Any, one: Any, other: Any) -> Any:
     return next(s for s in node.outputs if s.enabled)
 
 
-def denoise(guides: dict[str, NDArray], *pictures: NDArray[np.float32]) -> NDArray[np.float32]:
+def denoise(
+    guides: dict[str, NDArray], *pictures: NDArray[np.float32], clean: bool = False
+) -> NDArray[np.float32]:
     """The sum of pictures (H, W, 3), scene-linear, each denoised by itself.
 
     Parts of a picture with noise of different size are cleaned better one by one.
-    guides: `albedo` and `normal`, (H, W, 3), or neither.
+    guides: `albedo` and `normal`, (H, W, 3), or neither; clean: they have next to no noise, and
+    need not be denoised themselves, which takes longer than the pictures.
     """
     height, width = pictures[0].shape[:2]
     studio = bpy.data.scenes.new("ARTO Denoise")
@@ -83,6 +91,7 @@ def denoise(guides: dict[str, NDArray], *pictures: NDArray[np.float32]) -> NDArr
             for i, picture in enumerate(pictures):
                 node = tree.nodes.new("CompositorNodeDenoise")
                 node.inputs["HDR"].default_value = True
+                node.inputs["Prefilter"].default_value = "None" if clean else "Accurate"
                 noisy = source(f"picture{i}", picture, bpy.data.colorspace.working_space)
                 for name, socket in {"Image": noisy, **steer}.items():
                     tree.links.new(socket, node.inputs[name])

@@ -72,7 +72,8 @@ def relight(scene: bpy.types.Scene) -> Steps:
     if settings.denoise:
         yield Progress(0.7, "denoising")
         if denoise.available():
-            parts = [denoise.denoise(denoise.guides_of(field), *parts)]
+            clean = field.about.get("samples", 0) >= denoise.CLEAN_SAMPLES
+            parts = [denoise.denoise(denoise.guides_of(field), *parts, clean=clean)]
             denoised = "Open Image Denoise"
         else:
             # said here, in the file's header and in the last line

@@ -63,7 +63,7 @@ def _accuracy(options: argparse.Namespace) -> None:
     if options.quick:
         options.scenes = options.scenes or ["four_spheres", "window"]
         options.worlds = options.worlds or ["courtyard", "city", "sky35"]
-        options.turns, options.more = [0.0], []
+        options.turns = [0.0]
         options.width, options.time_width, options.many = 64, 96, 256
     size, time_size = ((w, w * 3 // 4) for w in (options.width, options.time_width))
     worlds = all_worlds(options.worlds, options.turns)
@@ -75,7 +75,6 @@ def _accuracy(options: argparse.Namespace) -> None:
         time_size,
         options.samples,
         options.many,
-        options.more,
     )
     print(report.table(rows, options.samples), "\n")
     print(report.summary(rows, options.samples), "\n")
@@ -162,7 +161,6 @@ def main() -> int:
     c.add_argument("--width", type=int, default=96, help="of the pictures for errors")
     c.add_argument("--time-width", type=int, default=320, help="of the renders for seconds")
     c.add_argument("--samples", type=int, default=128)
-    c.add_argument("--more", nargs="*", type=int, default=[], help="other samples of ARTO's")
     c.add_argument("--many", type=int, default=512, help="samples of each of two references")
     c.add_argument("--plot", type=Path, default=Path("out/accuracy.png"))
     c.add_argument("--sheet", type=Path, default=Path("out/accuracy_sheet.png"))

@@ -47,7 +47,6 @@ class Times:
     """Seconds of one scene at the size for times; `a_sample` is what one more sample costs."""
 
     capture: float
-    capture_a_sample: float
     fit: float
     relight: float
     lamps: float
@@ -55,10 +54,6 @@ class Times:
     render: float
     render_a_sample: float
     stage: float
-
-    def capture_of(self, samples: float) -> float:
-        """A capture of so many samples."""
-        return self.capture + self.capture_a_sample * samples
 
     def render_of(self, samples: float) -> float:
         """A render of so many samples, denoised."""
@@ -115,11 +110,8 @@ def times(scene_name: str, size: tuple[int, int], samples: int) -> Times:
         scene.arto.folder = folder
         scene.arto.output = str(Path(folder) / "relit.exr")
         layer = scene.view_layers[0].name
-        taken = []
-        for n in (samples // 4, samples):
-            scene.arto.samples = n
-            taken.append(seconds_of(lambda: work.run(capture.capture(scene, layer))))
-        capture_sample = max((taken[1] - taken[0]) / (samples - samples // 4), 0.0)
+        scene.arto.samples = samples
+        taken = seconds_of(lambda: work.run(capture.capture(scene, layer)))
         fitting = seconds_of(lambda: work.run(fit.fit(scene)))
         scene.arto.lamps = False
         work.run(relight.relight(scene))
@@ -135,8 +127,7 @@ def times(scene_name: str, size: tuple[int, int], samples: int) -> Times:
             setattr(scene.arto, name, value)
         stage = seconds_of(lambda: work.run(capture.capture(scene, layer)))
     return Times(
-        capture=taken[1] - capture_sample * samples,
-        capture_a_sample=capture_sample,
+        capture=taken,
         fit=fitting,
         relight=relit,
         lamps=max(lit[0] - relit - 4 * light_sample, 0.0),
@@ -148,21 +139,14 @@ def times(scene_name: str, size: tuple[int, int], samples: int) -> Times:
 
 
 class Shot:
-    """One scene, captured and fitted in every way.
+    """One scene, captured and fitted in every way."""
 
-    more: other numbers of samples that ARTO, and only ARTO, is captured with.
-    """
-
-    def __init__(
-        self, scene_name: str, size: tuple[int, int], samples: int, more: Iterable[int] = ()
-    ) -> None:
+    def __init__(self, scene_name: str, size: tuple[int, int], samples: int) -> None:
         self.name, self.size, self.samples = scene_name, size, samples
-        self.folders: dict[int, Path] = {}
-        for n in (samples, *more):
-            self.folders[n] = captured(scene_name, size, n).folder.parents[1].resolve()
-            scene = self.scene(n)
-            work.run(fit.fit(scene))
-        self.fields = {ARTO: Field(paths.field_folder(self.scene(samples)))}
+        self.folder = captured(scene_name, size, samples).folder.parents[1].resolve()
+        scene = self.scene()
+        work.run(fit.fit(scene))
+        self.fields = {ARTO: Field(paths.field_folder(scene))}
         rich = captured(
             scene_name, size, samples, patterns="moments_uv", grain=True, adaptive=False
         )
@@ -177,18 +161,15 @@ class Shot:
         self.cubes = {name: f.hemicube for name, f in self.fields.items()}
         self.guides = denoise.guides_of(self.fields[ARTO])
 
-    def scene(self, samples: int | None = None) -> bpy.types.Scene:
-        """The scene anew, with the folder of its capture of so many samples."""
+    def scene(self) -> bpy.types.Scene:
+        """The scene anew, with the folder of its capture."""
         scene = reference.new_scene(self.name, *self.size)
-        scene.arto.samples = samples or self.samples
-        scene.arto.folder = str(self.folders[scene.arto.samples])
+        scene.arto.samples, scene.arto.folder = self.samples, str(self.folder)
         return scene
 
-    def arto(
-        self, world: World, samples: int | None = None, **settings: Any
-    ) -> NDArray[np.float32]:
+    def arto(self, world: World, **settings: Any) -> NDArray[np.float32]:
         """What the add-on's relight operator writes."""
-        scene = self.scene(samples)
+        scene = self.scene()
         world.apply(scene)
         scene.render.film_transparent = True
         with tempfile.TemporaryDirectory() as folder:
@@ -199,7 +180,7 @@ class Shot:
 
     def pictures(self, world: World, environment: Environment) -> dict[str, NDArray]:
         """Every method's picture under a world."""
-        out = {RAW: self.arto(world, denoise=False)}
+        out = {ARTO: self.arto(world), RAW: self.arto(world, denoise=False)}
         lights: dict[Any, PatchLight] = {}
         for name, field in self.fields.items():
             cube = self.cubes[name]
@@ -207,11 +188,11 @@ class Shot:
                 lights[cube] = PatchLight(environment, cube)
             picture = relight_field(field, lights[cube])[..., :3]
             if name == ARTO:
-                out[NO_LAMPS] = denoise.denoise(self.guides, picture)
+                out[NO_LAMPS] = denoise.denoise(self.guides, picture, clean=True)
             else:
                 out[name] = picture
             if name == STAGE:
-                out[f"{STAGE} denoised"] = denoise.denoise(self.guides, picture)
+                out[f"{STAGE} denoised"] = denoise.denoise(self.guides, picture, clean=True)
             if name == "auto":
                 caps = matte.relight(self.caps, lights[cube])
                 out[MATTE] = caps.reshape(*self.size[::-1], 3)
@@ -291,8 +272,7 @@ def world_rows(
     if split.worth:
         wanted = shot.scene().arto.lamp_samples
         lamp_samples = max(relight.LEAST_SAMPLES, math.ceil(wanted * split.share))
-    found = [(ARTO, n, np.maximum(shot.arto(world, n), 0)) for n in shot.folders]
-    found += [(n, shot.samples, p) for n, p in shot.pictures(world, environment).items()]
+    found = [(n, shot.samples, p) for n, p in shot.pictures(world, environment).items()]
     for samples in SAMPLES:
         raw, clean = rerendered(shot.name, world, shot.size, samples)
         found += [(RENDER, samples, raw), (RENDER_DENOISED, samples, clean)]
@@ -304,9 +284,8 @@ def world_rows(
         cost = {"capture": 0.0, "fit": 0.0, "relight": measured.render_of(samples)}
         if not is_render:
             lit = lamp_samples if method in (ARTO, RAW) else 0
-            whole = method.startswith(STAGE)
             cost = {
-                "capture": measured.stage if whole else measured.capture_of(samples),
+                "capture": measured.stage if method.startswith(STAGE) else measured.capture,
                 "fit": measured.fit,
                 "relight": measured.relight_of(lit),
             }
@@ -357,17 +336,9 @@ def accuracy(
     time_size: tuple[int, int],
     samples: int,
     many: int,
-    more: Iterable[int] = (),
 ) -> list[dict[str, Any]]:
     """All rows; those that `out` holds of the same code and options are kept."""
-    more = list(more)
-    setup = {
-        "size": size,
-        "time": time_size,
-        "samples": [samples, *more],
-        "many": many,
-        "code": code_key(),
-    }
+    setup = {"size": size, "time": time_size, "samples": samples, "many": many, "code": code_key()}
     state = out.with_suffix(".state.json")
     text = json.dumps(setup)
     there = json.loads(state.read_text()) if state.is_file() else {}
@@ -396,7 +367,7 @@ def accuracy(
         if not missing:
             continue
         measured = Times(**there["times"][scene_name])
-        shot = Shot(scene_name, size, samples, more)
+        shot = Shot(scene_name, size, samples)
         for world in missing:
             if world not in maps:
                 scene = shot.scene()

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import FieldError
-from .moments import UNIFORM_VARIANCE, Moments
+from .moments import UNIFORM_VARIANCE, Moments, channel_sum
 from .patterns import ONE, PatternSet
 from .supports import BOX, LINEAR, NOTHING, PER_CHANNEL, SUPPORTS, WHOLE, Support
 
@@ -69,7 +69,7 @@ def evidence(
     average: over a window of pixels. Without it, hits are counted by the patch's share of the
     light, which takes all paths for equal.
     """
-    size = coefficients.sum(axis=-1, dtype=np.float64)
+    size = channel_sum(coefficients)
     total = size.sum(axis=0)
     order = np.sort(size, axis=0)
     kept = np.cumsum(order, axis=0) > DROPPED * total
@@ -129,7 +129,7 @@ def automatic(moments: Moments, hits: NDArray, least: NDArray) -> NDArray[np.uin
     hits, least: (n,), see `Evidence`. Moments without spreads (NaN) leave the box out.
     """
     n = np.maximum(hits, 1e-9)
-    size = moments.coefficient.sum(axis=-1, dtype=np.float64)
+    size = channel_sum(moments.coefficient)
     off_centre = np.zeros(len(size))
     spread_gain = np.zeros(len(size))
     narrow = np.ones(len(size), bool)

@@ -12,7 +12,7 @@ import numpy as np
 from . import choice as choices
 from .capture_set import CaptureSet, TileData
 from .field import FieldWriter, TileWriter
-from .moments import Moments
+from .moments import Moments, channel_sum
 from .patterns import PatternSet
 from .search import search
 from .supports import BOX, WHOLE
@@ -37,7 +37,7 @@ def fit_tile(
     coefficients = patterns.coefficient(np.moveaxis(images, 1, 0))
     shape = (data.region.height, data.region.width)
     known = choices.evidence(coefficients, shape, samples, data.grain)
-    brightest = coefficients.sum(axis=-1).argmax(axis=0)
+    brightest = channel_sum(coefficients).argmax(axis=0)
     for k in range(patches):
         moments = Moments.from_basis(images[k], patterns, separate)
         if choice == choices.SEARCH:
