@@ -20,6 +20,9 @@ from .lamps import lamp_light
 from .work import Progress, Steps
 from .world import background, bake, check_world
 
+# From this share of the light on the lamps are the picture, and what the field adds is denoised
+# with them: by themselves, beside darkness, they come out of the denoiser worse (docs/accuracy.md).
+NEARLY_ALL = 0.9
 # Fewer samples of the lamps than this have no time to smooth an edge.
 LEAST_SAMPLES = 4
 
@@ -48,7 +51,7 @@ def relight(scene: bpy.types.Scene) -> Steps:
     environment = bake(scene, settings.environment_width)
     lap("world")
     parts: list[NDArray[np.float32]] = []
-    lamps = "no"
+    lamps, together = "no", False
     if settings.lamps:
         found = split(environment, None if field.hemicube.closed else field.hemicube)
         if found.worth and not field.about.get("far", True):
@@ -59,7 +62,7 @@ def relight(scene: bpy.types.Scene) -> Steps:
             lamps = f"{found.share:.0%} of the world's light, {samples} samples"
             yield Progress(0.2, f"the world's lamps: {lamps}")
             parts.append((yield from lamp_light(scene, field, found.lamps, samples, 0.3)))
-            environment = found.rest
+            environment, together = found.rest, found.share >= NEARLY_ALL
         lap("lamps")
     yield Progress(0.5, "bringing the environment to the patches")
     light = PatchLight(environment, field.hemicube)
@@ -67,6 +70,8 @@ def relight(scene: bpy.types.Scene) -> Steps:
     yield Progress(0.6, "relighting")
     picture = relight_field(field, light, settings.own_lamps)
     parts.append(picture[..., :3])
+    if together:
+        parts = [sum(parts)]
     lap("relight")
     denoised = "no"
     if settings.denoise:

@@ -44,7 +44,7 @@ def _one_by_one(images: NDArray, guides: dict[str, NDArray]) -> NDArray:
     """Open Image Denoise on every moment image by itself; moments of one patch then no longer
     belong to one transport, so its mean is held inside the patch."""
     flat = images.reshape(-1, *images.shape[-3:])
-    out = np.stack([np.maximum(denoise.denoise(guides, image), 0) for image in flat])
+    out = np.stack([np.maximum(denoise.denoise(guides, image, clean=True), 0) for image in flat])
     out = out.reshape(images.shape)
     out[:, 1:] = np.minimum(out[:, 1:], out[:, :1])
     return out
@@ -64,7 +64,7 @@ def noise(
         guides = {n: data.guides[n] for n in ("albedo", "normal")}
 
         def final(picture: NDArray, guides: dict[str, NDArray] = guides) -> NDArray:
-            return np.maximum(denoise.denoise(guides, picture), 0)
+            return np.maximum(denoise.denoise(guides, picture, clean=True), 0)
 
         shared = _shared(data.basis, guides)
         single = _one_by_one(data.basis, guides)
