@@ -153,15 +153,17 @@ def plot(path: Path, rows: Rows) -> None:
         once = r["capture_seconds"] + r["fit_seconds"]
         unit = r["plain_render_seconds"]
         if r["method"] in (RENDER, RENDER_DENOISED):
-            curves = {r["method"]: r["relight_seconds"]}
+            curves = {(r["method"], r["samples"]): r["relight_seconds"]}
         elif r["method"] == ARTO:
-            curves = {f"{ARTO}, {n} relights": once / n + r["relight_seconds"] for n in (1, 5, 20)}
+            name = f"{ARTO}, 1, 5 and 20 relights"
+            curves = {(name, -n): once / n + r["relight_seconds"] for n in (1, 5, 20)}
         elif r["method"] in (STAGE, STAGE_DENOISED, MATTE, RAW, NO_LAMPS, "whole"):
-            curves = {f"{r['method']}, 5 relights": once / 5 + r["relight_seconds"]}
+            name = f"{r['method']}, 5 relights"
+            curves = {(name, 5): once / 5 + r["relight_seconds"]}
         else:
             continue
-        for name, seconds in curves.items():
-            found[name][r["samples"]].append((seconds / unit, r["mean_relative_error"]))
+        for (name, point), seconds in curves.items():
+            found[name][point].append((seconds / unit, r["mean_relative_error"]))
     figure, axis = plt.subplots(figsize=(9, 6), layout="constrained")
     for name, points in found.items():
         xy = [np.median(np.array(points[s]), axis=0) for s in sorted(points)]
