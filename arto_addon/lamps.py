@@ -71,6 +71,8 @@ def lamp_light(
         stage(scene, field.about["view_layer"]) as on,
         tempfile.TemporaryDirectory() as folder,
     ):
+        # whatever the artist looks at meanwhile: the field is Cycles'
+        on.change("render.engine", "CYCLES")
         prepare(on, layers=0)
         on.change("cycles.samples", samples)
         on.scene.world = _world(on, lamps)
@@ -87,6 +89,11 @@ def lamp_light(
             raise SceneError(
                 "Blender wrote no light of the world's lamps: turn Render Lamps off to relight "
                 "without them"
+            )
+        if bad := int((~np.isfinite(light[..., :3])).any(axis=-1).sum()):
+            raise SceneError(
+                f"the light of the world's lamps has {bad} pixels that are infinite or not a "
+                "number: find the material there, or turn Render Lamps off"
             )
         out[region.slices] = light[..., :3]
     return out

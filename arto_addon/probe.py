@@ -11,6 +11,7 @@ import numpy as np
 
 from ..core import exr
 from ..core.capture_set import GROUP
+from ..core.errors import CaptureSetError
 from ..core.hemicube import FINEST, Hemicube
 from ..core.patterns import pattern_set
 from ..core.refine import refine
@@ -26,7 +27,7 @@ SAMPLES = 32
 def refined(on: Stage, hemicube: Hemicube, most: int) -> Steps:
     """Render a probe of the prepared stage and refine the hemicube by it -> Hemicube.
 
-    Raises CancelledError, ExrError, HemicubeError; the stage is left as it was.
+    Raises CancelledError, CaptureSetError, ExrError, HemicubeError; the stage is left as it was.
     """
     scene = on.scene
     render, cycles = scene.render, scene.cycles
@@ -56,6 +57,11 @@ def refined(on: Stage, hemicube: Hemicube, most: int) -> Steps:
                 request.check()
             found = [(GROUP.search(name), pixels) for name, pixels in exr.read(path).items()]
             by_patch = {int(match[1]): pixels for match, pixels in found if match}
+            if missing := len(fine) - len(by_patch):
+                raise CaptureSetError(
+                    f"the probe lacks {missing} of {len(fine)} light groups: make room on the disk "
+                    f"of {folder}, or turn Adaptive Patches off"
+                )
             probe = np.stack([by_patch[k] for k in range(len(fine))])
         finally:
             for (owner, name), value in were.items():

@@ -57,6 +57,9 @@ def relight(scene: bpy.types.Scene) -> Steps:
         if found.worth and not field.about.get("far", True):
             lamps = "no: lamps at infinity would not stand where a near hemicube has them"
             yield Progress(0.3, f"the world's lamps: {lamps}")
+        elif found.worth and "view_layer" not in field.about:
+            lamps = "no: the field does not say of which view layer it is; capture again"
+            yield Progress(0.3, f"the world's lamps: {lamps}")
         elif found.worth:
             samples = max(LEAST_SAMPLES, math.ceil(settings.lamp_samples * found.share))
             lamps = f"{found.share:.0%} of the world's light, {samples} samples"

@@ -71,6 +71,14 @@ class Environment:
         return self.row_solid_angles @ rows
 
 
+def directions(azimuth: NDArray, latitude: NDArray) -> NDArray[np.float64]:
+    """Unit vectors (H, W, 3) of azimuths (W, 2, unit vectors) and latitudes (H,)."""
+    out = np.empty((len(latitude), len(azimuth), 3))
+    out[..., :2] = np.cos(latitude)[:, None, None] * azimuth
+    out[..., 2] = np.sin(latitude)[:, None]
+    return out
+
+
 def sample_directions(height: int, width: int, finer: int) -> tuple[NDArray, NDArray, NDArray]:
     """Directions of a grid `finer` times as fine as a map of height x width.
 

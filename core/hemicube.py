@@ -38,6 +38,7 @@ PRESETS: dict[str, tuple[str, ...]] = {
 # A patch of a quadtree: face, patches a side if all were of its size, row, column.
 Leaf = tuple[str, int, int, int]
 FINEST = 16
+LEAF_SIDES = (1, 2, 4, 8, FINEST)
 
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -69,8 +70,8 @@ class Hemicube:
         if not 1 <= self.patches <= 16:
             raise HemicubeError(f"{self.patches} patches a side: choose 1 to 16")
         for face, n, row, column in self.leaves:
-            size = n in (1, 2, 4, 8, FINEST)
-            if face not in self.faces or not (size and 0 <= row < n and 0 <= column < n):
+            inside = n in LEAF_SIDES and 0 <= row < n and 0 <= column < n
+            if face not in self.faces or not inside:
                 raise HemicubeError(f"no patch {row},{column} of {n}x{n} on the face '{face}'")
         if self.leaves and (self.table >= 0).sum() != sum(
             (FINEST // n) ** 2 for _, n, _, _ in self.leaves

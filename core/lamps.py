@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .environment import Environment, sample_directions
+from .environment import Environment, directions, sample_directions
 from .hemicube import Hemicube
 
 # How many times brighter than the rest of the map, on average, a lamp is.
@@ -74,7 +74,4 @@ def split(
 def _covered(hemicube: Hemicube, height: int, width: int) -> NDArray[np.bool_]:
     """Which texels of a map lie in the direction of a patch -> (height, width)."""
     azimuth, latitude, _ = sample_directions(height, width, 1)
-    d = np.empty((height, width, 3))
-    d[..., :2] = np.cos(latitude)[:, None, None] * azimuth
-    d[..., 2] = np.sin(latitude)[:, None]
-    return hemicube.locate(d)[0] >= 0
+    return hemicube.locate(directions(azimuth, latitude))[0] >= 0

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .environment import Environment, sample_directions
+from .environment import Environment, directions, sample_directions
 from .hemicube import Hemicube
 from .patterns import monomials
 
@@ -42,11 +42,7 @@ def _bins(
     bins = np.empty((height * finer, width * finer), np.int32)
 
     def fill(row: int) -> None:
-        part = latitude[row : row + 64]
-        d = np.empty((len(part), len(azimuth), 3))
-        d[..., :2] = np.cos(part)[:, None, None] * azimuth
-        d[..., 2] = np.sin(part)[:, None]
-        k, u, v = hemicube.locate(d)
+        k, u, v = hemicube.locate(directions(azimuth, latitude[row : row + 64]))
         r = resolutions[k].astype(np.int32)
         i = bin_coordinate(hemicube, k, u, 0, r).astype(np.int32)
         j = bin_coordinate(hemicube, k, v, 1, r).astype(np.int32)

@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import HemicubeError
-from .hemicube import FINEST, Hemicube, Leaf
+from .hemicube import FINEST, LEAF_SIDES, Hemicube, Leaf
+from .moments import channel_sum
 
 # Cells (5.6 degrees) over which light stays alike: its correlation falls to 1/e.
 ALIKE = 3.0
@@ -96,14 +97,16 @@ def refine(hemicube: Hemicube, probe: NDArray, samples: float, most: int) -> Hem
     the field stays right for light that the probe did not see. Raises HemicubeError.
     """
     faces = len(hemicube.faces)
-    if hemicube.leaves or hemicube.half_sides or hemicube.patches not in (1, 2, 4, 8, FINEST):
+    if hemicube.leaves or hemicube.half_sides or hemicube.patches not in LEAF_SIDES:
         raise HemicubeError(
             "only whole faces of 1, 2, 4, 8 or 16 patches a side can be refined: choose such a "
             "number, or turn Adaptive Patches off"
         )
     if probe.shape[0] != faces * FINEST**2:
         raise HemicubeError(f"a probe of {probe.shape[0]} patches, not {faces * FINEST**2}")
-    light = probe.sum(axis=-1, dtype=np.float64).reshape(faces, FINEST, FINEST, -1)
+    light = channel_sum(probe).reshape(faces, FINEST, FINEST, -1)
+    # a broken material's pixels tell nothing; the capture itself will name them
+    light = light[..., np.isfinite(light).all(axis=(0, 1, 2))]
     total = light.sum(axis=(0, 1, 2))
     lit = total > 1e-3 * total.mean() if total.any() else np.zeros(total.shape, bool)
     if not lit.any():

@@ -102,6 +102,16 @@ def cycles(scene: bpy.types.Scene, samples: int, seed: int, folder: Path) -> np.
     return next(iter(exr.read(folder / "cycles.exr").values()))
 
 
+def assert_as_cycles(picture: np.ndarray, scene: Any, samples: int, folder: Path) -> None:
+    """A plate (H, W, 4) is what Cycles renders: off by less than two of its renders are from each
+    other, twice over, and as bright to a hundredth."""
+    one, two = (cycles(scene, samples, seed, folder) for seed in (1, 2))
+    seen = one[..., 3] > 0.999
+    noise = np.abs(one - two)[seen].mean()
+    assert np.abs(picture - one)[seen].mean() < 2 * noise
+    assert abs(picture[seen].mean() / one[seen].mean() - 1) < 0.01
+
+
 _SKIP = {"rna_type", "original", "session_uid", "users", "tag", "is_evaluated", "bl_rna"}
 
 

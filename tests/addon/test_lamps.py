@@ -9,6 +9,7 @@ from arto.arto_addon import fit, lamps, paths, relight, work
 from arto.arto_addon.world import bake
 from arto.core import exr
 from arto.core.environment import Environment
+from arto.core.errors import SceneError
 from arto.core.field import Field
 from arto.core.lamps import split
 from scene_tools import captured, cycles, differences, small_scene, snapshot
@@ -134,6 +135,38 @@ def test_cancelling_the_lamps_leaves_nothing_behind(shot):
             break
     steps.close()
     assert (len(bpy.data.worlds), len(bpy.data.images), len(bpy.data.scenes)) == worlds
+
+
+def test_another_engine_meanwhile_changes_nothing(shot):
+    """The artist looks at the scene with another engine: the lamps are Cycles' all the same."""
+    expected, _ = relit(shot)
+    shot.render.engine = "BLENDER_WORKBENCH"
+    try:
+        found, _ = relit(shot)
+    finally:
+        shot.render.engine = "CYCLES"
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_pixels_that_are_no_number_are_said(shot, monkeypatch):
+    """A broken material: a message, nothing written, nothing left behind."""
+    before = relit(shot)[0]
+    read = exr.read
+
+    def broken(path):
+        parts = read(path)
+        for name, pixels in parts.items():
+            if name.endswith(lamps.GROUP):
+                pixels[3, 4] = np.nan
+        return parts
+
+    scenes = len(bpy.data.scenes)
+    monkeypatch.setattr(lamps.exr, "read", broken)
+    with pytest.raises(SceneError, match="1 pixels that are infinite or not a number"):
+        work.run(relight.relight(shot))
+    monkeypatch.undo()
+    assert len(bpy.data.scenes) == scenes
+    np.testing.assert_array_equal(read(paths.relit_file(shot))[""], before)
 
 
 def test_a_near_hemicube_keeps_its_lamps(tmp_path):

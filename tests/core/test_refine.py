@@ -88,6 +88,18 @@ def test_a_black_probe_changes_nothing() -> None:
     assert refined(flat() * 0) == CUBE
 
 
+def test_broken_pixels_do_not_decide() -> None:
+    probe = flat() * 1e-3
+    rng = np.random.default_rng(4)
+    probe[2, 6:10, 3:8] = rng.uniform(0.1, 3, (4, 5, *SHAPE, 1))
+    broken = probe.copy()
+    broken[..., 0, 0, :] = np.nan
+    broken[3, 4, 5, 0, 1, 2] = np.inf
+    kept = probe.reshape(-1, SHAPE[0] * SHAPE[1], 1, 3)[:, 2:]
+    assert refined(broken) == refine(CUBE, kept, MANY, 192)
+    assert len(refined(broken)) > 6
+
+
 def test_only_whole_faces_can_be_refined() -> None:
     probe = flat().reshape(-1, *SHAPE, 3)
     for cube in (Hemicube(patches=3), Hemicube(half_sides=True)):
