@@ -102,7 +102,7 @@ def summary(rows: Rows, samples: int) -> str:
         f"- break-even: median {median(paid):g} relights; never in "
         f"{sum(c is None for c in counts)} of {len(counts)}",
         f"- capture of {samples} samples: {min(ratio):.2f} to {max(ratio):.2f} times a plain "
-        "render of 128, denoised",
+        "render of as many, denoised",
     ]
     for other in (STAGE, STAGE_DENOISED, MATTE):
         by_scene = _ratio(rows, samples, other)
