@@ -129,6 +129,7 @@ class CaptureSet:
             except ExrError as e:
                 raise CaptureSetError(f"{e} (run Capture again)") from e
             lit = np.zeros((*shape, 3))
+            here = np.zeros(basis.shape[:2], bool)
             combined: NDArray | None = None
             for part in list(parts):
                 pixels = parts.pop(part)
@@ -142,11 +143,12 @@ class CaptureSet:
                         )
                     k, p = wanted.pop(key)
                     image = self._checked(path, part, pixels, (*shape, 3))
-                    lit += image
                     if p >= 0:
                         basis[k, p] = image
+                        here[k, p] = True
                     elif grain is not None:
                         grain[k] = image.sum(axis=-1)
+                        lit += image
                 elif part == "Combined" or part.endswith(".Combined"):
                     combined = self._checked(path, part, pixels, (*shape, 4))
                 else:
@@ -158,6 +160,9 @@ class CaptureSet:
             if combined is None:
                 raise CaptureSetError(f"{path} has no part 'Combined': capture again")
             if own is None:
+                # float64, but for the few images of one patch, which numpy adds faster as they are
+                for images, in_file in zip(basis, here, strict=True):
+                    lit += images[in_file].sum(axis=0)
                 own = np.asarray(combined[..., :3] - lit)
                 own[np.abs(own) < ROUNDING * lit] = 0
                 alpha = combined[..., 3]

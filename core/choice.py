@@ -34,6 +34,8 @@ CHOICES = ("auto", *SUPPORTS, SEARCH, STAGE_AND_MATTE)
 # Entries are dropped as nothing, smallest first, while what is dropped stays under this share of
 # the pixel's light.
 DROPPED = 1e-3
+# Pixels whose entries are sorted at a time: as many as fit the cache with their patches.
+BLOCK = 2048
 # Pixels along the side of the window that an entry's noise is measured in.
 WINDOW = 5
 # A mean this near to the patch's middle, its own uncertainty included, is the middle.
@@ -44,15 +46,43 @@ BROAD = 0.35
 
 @dataclass(frozen=True)
 class Evidence:
-    """How far the moments of a tile can be believed.
+    """How far the moments of a tile can be believed, and which are too small to keep.
 
-    hits: (K, n) how many equal light paths would be as noisy as what reached each patch, infinite
-    where there is no such noise (photographs); least: (n,) coefficient, summed over channels, under
-    which an entry is dropped.
+    least: (n,) coefficient, summed over channels, under which an entry is dropped; total: (n,) that
+    of all patches; shape: (h, w) of the tile, n = h x w; samples: samples a pixel of the capture,
+    None without noise (photographs); grain: (K, h, w), see `capture_set.GRAIN`.
     """
 
-    hits: NDArray
     least: NDArray
+    total: NDArray
+    shape: tuple[int, int]
+    samples: float | None = None
+    grain: NDArray | None = None
+
+    def kept(self, coefficient: NDArray) -> NDArray[np.intp]:
+        """The pixels in which a patch of these coefficients, (n, 3), is more than nothing."""
+        size = channel_sum(coefficient)
+        return np.flatnonzero((size > 0) & (size >= self.least))
+
+    def hits(self, k: int, coefficient: NDArray) -> NDArray:
+        """How many equal light paths would be as noisy as what reached patch k -> (n,).
+
+        Infinite where there is no such noise. Paths of weights w_i are as good as
+        (sum w)^2 / sum w^2 equal ones. Grain shows the sum of squares, on average: over a window of
+        pixels. Without it, hits are counted by the patch's share of the light, which takes all
+        paths for equal.
+        """
+        size = channel_sum(coefficient)
+        if self.samples is None:
+            return np.full(size.shape, np.inf)
+        share = self.samples * size / np.where(self.total > 0, self.total, 1)
+        if self.grain is None:
+            return share
+        squares = _window_sum(np.square(self.grain[k], dtype=np.float64))
+        signal = _window_sum(np.square(size).reshape(self.shape))
+        found = signal / np.maximum(squares, 1e-300)
+        # few grains may cancel by chance; no path counts for more than one sample
+        return np.minimum(found.ravel(), 2 * share + 1)
 
 
 def evidence(
@@ -61,44 +91,32 @@ def evidence(
     samples: float | None = None,
     grain: NDArray | None = None,
 ) -> Evidence:
-    """What is known of a tile's noise, and what is too small to keep.
-
-    coefficients: (K, n, 3) of all patches; shape: (h, w) of the tile, n = h x w; samples: samples a
-    pixel of the capture, None without noise; grain: (K, h, w), see `capture_set.GRAIN`. Paths of
-    weights w_i are as good as (sum w)^2 / sum w^2 equal ones. Grain shows the sum of squares, on
-    average: over a window of pixels. Without it, hits are counted by the patch's share of the
-    light, which takes all paths for equal.
-    """
-    size = channel_sum(coefficients)
-    total = size.sum(axis=0)
-    order = np.sort(size, axis=0)
-    kept = np.cumsum(order, axis=0) > DROPPED * total
-    # the smallest entry that must be kept
-    least = np.take_along_axis(order, kept.argmax(axis=0)[None], axis=0)[0]
-    if samples is None:
-        return Evidence(np.full(size.shape, np.inf), least)
-    share = samples * size / np.where(total > 0, total, 1)
-    if grain is None:
-        return Evidence(share, least)
-    squares = _window_sum(np.square(grain, dtype=np.float64))
-    signal = _window_sum(np.square(size).reshape(-1, *shape))
-    found = signal / np.maximum(squares, 1e-300)
-    # few grains may cancel by chance; no path counts for more than one sample
-    return Evidence(np.minimum(found.reshape(size.shape), 2 * share + 1), least)
+    """What is known of a tile: see `Evidence`. coefficients: (K, n, 3) of all patches."""
+    pixels = coefficients.shape[1]
+    least, total = np.empty(pixels), np.empty(pixels)
+    for start in range(0, pixels, BLOCK):
+        block = slice(start, start + BLOCK)
+        size = np.ascontiguousarray(channel_sum(coefficients[:, block]).T)
+        total[block] = size.sum(axis=1)
+        size.sort(axis=1)
+        kept = np.cumsum(size, axis=1) > DROPPED * total[block, None]
+        # the smallest entry that must be kept
+        least[block] = np.take_along_axis(size, kept.argmax(axis=1)[:, None], axis=1)[:, 0]
+    return Evidence(least, total, shape, samples, grain)
 
 
-def _window_sum(images: NDArray) -> NDArray:
-    """Sums over windows of `WINDOW` pixels a side, cut at the rim: (K, h, w) -> (K, h, w)."""
-    for axis in (1, 2):
-        length = images.shape[axis]
-        pad = [(0, 0)] * 3
+def _window_sum(image: NDArray) -> NDArray:
+    """Sums over windows of `WINDOW` pixels a side, cut at the rim: (h, w) -> (h, w)."""
+    for axis in (0, 1):
+        length = image.shape[axis]
+        pad = [(0, 0)] * 2
         pad[axis] = (1, 0)
-        sums = np.pad(np.cumsum(images, axis=axis), pad)
+        sums = np.pad(np.cumsum(image, axis=axis), pad)
         at = np.arange(length)
         high = np.minimum(at + WINDOW // 2 + 1, length)
         low = np.maximum(at - WINDOW // 2, 0)
-        images = sums.take(high, axis=axis) - sums.take(low, axis=axis)
-    return images
+        image = sums.take(high, axis=axis) - sums.take(low, axis=axis)
+    return image
 
 
 def check(choice: str, patterns: PatternSet) -> None:
@@ -123,54 +141,73 @@ def _aicc(parameters: int, n: NDArray) -> NDArray:
     return np.where(np.isinf(n), 2 * parameters, np.where(few > 0, price, np.inf))
 
 
-def automatic(moments: Moments, hits: NDArray, least: NDArray) -> NDArray[np.uint8]:
-    """The model codes (n,) of the smallest models that explain the moments of one patch.
+def _smallest(moments: Moments, hits: NDArray) -> NDArray[np.uint8]:
+    """The codes (n,) of the smallest models that explain the moments of one patch.
 
-    hits, least: (n,), see `Evidence`. Moments without spreads (NaN) leave the box out.
+    Moments without spreads (NaN) leave the box out.
     """
     n = np.maximum(hits, 1e-9)
-    size = channel_sum(moments.coefficient)
-    off_centre = np.zeros(len(size))
-    spread_gain = np.zeros(len(size))
-    narrow = np.ones(len(size), bool)
-    for mean, variance in zip(moments.mean, moments.variance, strict=True):
-        off = mean - 0.5
-        off_centre += off * off
+    offs = [mean - 0.5 for mean in moments.mean]
+    uncertain = np.sqrt(2 * UNIFORM_VARIANCE / n)
+    centred = np.sqrt(offs[0] * offs[0] + offs[1] * offs[1]) + uncertain < CENTRED
+    codes = np.where(centred, WHOLE.code, LINEAR.code).astype(np.uint8)
+    if np.isfinite(moments.variance).any():
+        codes[_shown_box(moments, offs, n)] = BOX.code
+    return codes
+
+
+def _shown_box(moments: Moments, offs: list[NDArray], n: NDArray) -> NDArray[np.bool_]:
+    """Where a box is shown, and narrow enough to be the better filter -> (n,).
+
+    offs: the means' distances from the middle, along u and v; n: hits.
+    """
+    spread_gain = np.zeros(len(n))
+    narrow = np.ones(len(n), bool)
+    for off, variance in zip(offs, moments.variance, strict=True):
         # twice the gain in log likelihood, a sample, of a spread of its own over that of a linear
         # density, 1/12 - off^2
         expected = np.maximum(UNIFORM_VARIANCE - off * off, UNIFORM_VARIANCE / 4)
         ratio = np.maximum(variance / expected, 1e-9)
         spread_gain += ratio - 1 - np.log(ratio)
         narrow &= 3 * variance < BROAD**2
-    uncertain = np.sqrt(2 * UNIFORM_VARIANCE / n)
-    centred = np.sqrt(off_centre) + uncertain < CENTRED
     with np.errstate(invalid="ignore"):
         box = np.where(np.isinf(n), True, n * spread_gain > _aicc(4, n) - _aicc(2, n))
-    codes = np.where(centred, WHOLE.code, LINEAR.code)
-    codes = np.where(narrow & box, BOX.code, codes)
-    return np.where((size > 0) & (size >= least), codes, NOTHING).astype(np.uint8)
+    return narrow & box
 
 
 def choose(
-    choice: str, moments: Moments, known: Evidence, k: int, separate: bool = False
+    choice: str,
+    basis: NDArray,
+    patterns: PatternSet,
+    known: Evidence,
+    k: int,
+    separate: bool = False,
 ) -> tuple[NDArray[np.uint8], dict[int, NDArray]]:
     """Model codes of n pixels for patch k, and for each code in use the parameters of its pixels.
 
-    separate: supports of each channel's own (then `moments.channels` must be there).
+    basis: (P, n, 3), the patch's images; choice: `auto`, or one model for every pixel that gets
+    light from the patch; separate: supports of each channel's own.
     """
+    coefficient = patterns.coefficient(basis)
+    codes = np.full(basis.shape[1], NOTHING, np.uint8)
     if choice == "auto":
-        codes = automatic(moments, known.hits[k], known.least)
+        # most entries are too dark to keep: what they see of their patch is not asked for
+        lit = known.kept(coefficient)
+        moments = Moments.from_basis(basis[:, lit], patterns, separate)
+        codes[lit] = _smallest(moments, known.hits(k, coefficient)[lit])
     else:
-        lit = (moments.coefficient > 0).any(axis=-1)
-        codes = np.where(lit, SUPPORTS[choice].code, NOTHING).astype(np.uint8)
+        lit = np.flatnonzero((coefficient > 0).any(axis=-1))
+        moments = Moments.from_basis(basis[:, lit], patterns, separate)
+        codes[lit] = SUPPORTS[choice].code
     found: dict[int, NDArray] = {}
+    chosen = codes[lit]
     for support in SUPPORTS.values():
-        here = codes == support.code
+        here = chosen == support.code
         if not here.any():
             continue
         used: Support = support
         if separate and support.parameters:
             used = PER_CHANNEL[support.name]
-            codes[here] = used.code
+            codes[lit[here]] = used.code
         found[used.code] = used.fit(moments.select(here))
     return codes, found

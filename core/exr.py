@@ -9,7 +9,7 @@ allocator that Blender puts in malloc's place, and Blender aborts.
 from __future__ import annotations
 
 import contextlib
-import os
+import mmap
 import struct
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 
 from .errors import ExrError
 
+# No name in a header is longer.
+_LONGEST_TEXT = 256
 _ORDER = "RGBAXYZ"  # of channels in an array; others follow
 # What a colour space is called in an EXR header (colorInteropID), by Blender's name for it.
 COLOUR_SPACES = {
@@ -52,51 +54,56 @@ def _check_complete(path: Path) -> int:
     The library reads what is left of a truncated file and fills the rest; here the light would
     be wrong without a word. Layout: magic, version, headers, table of chunk offsets, chunks.
     """
-    truncated = ExrError(f"{path} is truncated or damaged: make it again")
     if not path.is_file():
         raise ExrError(f"there is no file {path}: it was moved or deleted; make it again")
-    size = path.stat().st_size
-    with path.open("rb") as f:
-        start = f.read(8)
-        if len(start) < 8 or start[:4] != b"\x76\x2f\x31\x01":
+    if path.stat().st_size < 8:
+        raise ExrError(f"{path} is no EXR file (or an empty one): make it again")
+    with path.open("rb") as f, mmap.mmap(f.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        if data[:4] != b"\x76\x2f\x31\x01":
             raise ExrError(f"{path} is no EXR file (or an empty one): make it again")
-        multipart = bool(start[5] & 0x10)
-
-        def text() -> bytes:
-            out = b""
-            while (c := f.read(1)) != b"\0":
-                if not c or len(out) > 255:
-                    raise truncated
-                out += c
-            return out
-
-        parts = 0
-        while True:  # headers
-            empty = True
-            while text():
-                empty = False
-                text()  # the attribute's type
-                length = f.read(4)
-                if len(length) < 4:
-                    raise truncated
-                f.seek(struct.unpack("<I", length)[0], os.SEEK_CUR)
-            parts += not empty
-            if empty or not multipart:
-                break
-        # the table ends where the first chunk begins, which may be named last
-        end, last = size, 0
-        while (at := f.tell()) < end:
-            entry = f.read(8)
-            if len(entry) < 8 or (offset := struct.unpack("<Q", entry)[0]) <= at:
-                raise truncated
-            end, last = min(end, offset), max(last, offset)
-        if at != end or not last or last + 8 > size:
-            raise truncated
-        f.seek(last)
-        leader = f.read(12 if multipart else 8)
-        if len(leader) < 8 or f.tell() + struct.unpack("<I", leader[-4:])[0] > size:
-            raise truncated
+        parts = _complete_parts(data)
+    if not parts:
+        raise ExrError(f"{path} is truncated or damaged: make it again")
     return parts
+
+
+def _complete_parts(data: mmap.mmap) -> int:
+    """The number of parts of an EXR file's bytes, 0 where some are missing."""
+    multipart = bool(data[5] & 0x10)
+    size, at, parts = len(data), 8, 0
+
+    def past_text(at: int) -> int:
+        """Where a text that begins at `at` is over; past the file's end where it is not."""
+        end = data.find(b"\0", at, at + _LONGEST_TEXT)
+        return end + 1 if end >= 0 else size + 1
+
+    while True:  # headers
+        empty = True
+        while (past := past_text(at)) > at + 1:  # an empty name ends a header
+            empty = False
+            past = past_text(past) + 4  # the attribute's type, and how long it is
+            if past > size:
+                return 0
+            at = past + struct.unpack_from("<I", data, past - 4)[0]
+        at = past
+        parts += not empty
+        if empty or not multipart:
+            break
+    if at + 8 > size:
+        return 0
+    # the table ends where the first chunk begins, which may be named last
+    end = struct.unpack_from("<Q", data, at)[0]
+    while True:
+        if end > size or end < at + 8 or (end - at) % 8:
+            return 0
+        table = np.frombuffer(data[at:end], "<u8")
+        if int(table.min()) == end:
+            break
+        end = int(table.min())
+    leader = 12 if multipart else 8
+    last = int(table.max()) + leader
+    whole = last <= size and last + struct.unpack_from("<I", data, last - 4)[0] <= size
+    return parts if whole else 0
 
 
 def part_names(path: Path) -> list[str]:

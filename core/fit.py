@@ -37,22 +37,26 @@ def fit_tile(
     coefficients = patterns.coefficient(np.moveaxis(images, 1, 0))
     shape = (data.region.height, data.region.width)
     known = choices.evidence(coefficients, shape, samples, data.grain)
-    brightest = channel_sum(coefficients).argmax(axis=0)
+    brightest = None
+    if choice == choices.STAGE_AND_MATTE:
+        brightest = channel_sum(coefficients).argmax(axis=0)
     for k in range(patches):
-        moments = Moments.from_basis(images[k], patterns, separate)
         if choice == choices.SEARCH:
-            codes, _ = choices.choose("whole", moments, known, k)
+            codes, _ = choices.choose("whole", images[k], patterns, known, k)
             boxes = search(images[k], patterns, data.region.height)
             parameters = {BOX.code: boxes[codes == WHOLE.code]}
             codes[codes == WHOLE.code] = BOX.code
-        elif choice == choices.STAGE_AND_MATTE:
+        elif brightest is not None:
             # the straightforward combination: a Light Stage, and one matte where it is brightest
-            codes, _ = choices.choose("whole", moments, known, k)
+            codes, _ = choices.choose("whole", images[k], patterns, known, k)
             codes[(brightest == k) & (codes == WHOLE.code)] = BOX.code
-            parameters = {s.code: s.fit(moments.select(codes == s.code)) for s in (WHOLE, BOX)}
+            parameters = {
+                s.code: s.fit(Moments.from_basis(images[k][:, codes == s.code], patterns))
+                for s in (WHOLE, BOX)
+            }
         else:
-            codes, parameters = choices.choose(choice, moments, known, k, separate)
-        writer.add(codes, moments.coefficient, parameters)
+            codes, parameters = choices.choose(choice, images[k], patterns, known, k, separate)
+        writer.add(codes, coefficients[k], parameters)
         yield (k + 1) / patches
     yield writer
 

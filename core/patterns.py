@@ -104,8 +104,17 @@ class PatternSet:
             )
         inverse = self._pseudo_inverse.astype(basis.dtype)
         inverse[np.abs(inverse) < 1e-12] = 0
-        out = (inverse @ basis.reshape(len(self), -1)).reshape(6, *basis.shape[1:])
-        out[~np.array(self.identified)] = np.nan
+        out = np.empty((6, *basis.shape[1:]), basis.dtype)
+        for moment, row, identified in zip(out, inverse, self.identified, strict=True):
+            if not identified:
+                moment[...] = np.nan
+                continue
+            # term by term: most rows have one, and a product of matrices so thin keeps a library's
+            # threads busy with waiting for each other
+            first, *others = np.flatnonzero(row)
+            np.multiply(basis[first], row[first], out=moment)
+            for p in others:
+                moment += basis[p] * row[p]
         return out
 
 
