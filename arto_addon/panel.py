@@ -5,7 +5,14 @@ from __future__ import annotations
 import bpy
 
 from ..core.hemicube import SIDES
-from . import hemicube_planes
+from . import hemicube_planes, status
+
+
+def _line(column: bpy.types.UILayout, found: tuple[str, bool] | None) -> None:
+    """What is there already, below the button that makes it."""
+    if found:
+        text, serves = found
+        column.label(text=text, icon="CHECKMARK" if serves else "ERROR")
 
 
 class _Panel:
@@ -34,10 +41,12 @@ class ARTO_PT_main(_Panel, bpy.types.Panel):
         column.separator()
         column.prop(settings, "samples")
         column.operator("arto.capture", icon="RENDER_STILL")
+        _line(column, status.capture_line(context.scene))
         column.separator()
         column.prop(settings, "support")
         column.prop(settings, "separate")
         column.operator("arto.fit", icon="MOD_LATTICE")
+        _line(column, status.field_line(context.scene))
         column.separator()
         column.prop(settings, "own_lamps")
         column.prop(settings, "lamps")

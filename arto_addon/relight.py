@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.field import Field
+from ..core.field import Field, Region
 from ..core.lamps import split
 from ..core.light import PatchLight
 from ..core.relight import over
@@ -23,6 +23,8 @@ from .world import background, bake, check_world
 # From this share of the light on the lamps are the picture, and what the field adds is denoised
 # with them: by themselves, beside darkness, they come out of the denoiser worse (docs/accuracy.md).
 NEARLY_ALL = 0.9
+# Alpha from which on nothing is seen behind: the rounding of a mean of many ones.
+OPAQUE = 1 - 1e-5
 # Fewer samples of the lamps than this have no time to smooth an edge.
 LEAST_SAMPLES = 4
 
@@ -93,7 +95,9 @@ def relight(scene: bpy.types.Scene) -> Steps:
     np.maximum(picture, 0, out=picture)
     if not scene.render.film_transparent:
         yield Progress(0.8, "adding the world behind")
-        picture = over(picture, background(scene))
+        behind = np.nonzero(picture[..., 3] < OPAQUE)
+        if len(behind[0]):
+            picture = over(picture, background(scene, Region.around(*behind)))
         lap("background")
     yield Progress(0.9, f"writing {path}")
     world = scene.world.name if scene.world else ""

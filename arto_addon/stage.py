@@ -97,7 +97,7 @@ def float_exr(render: bpy.types.RenderSettings, multilayer: bool = True) -> None
     settings.file_format = "OPEN_EXR_MULTILAYER" if multilayer else "OPEN_EXR"
     settings.color_mode = "RGBA"
     settings.color_depth = "32"
-    settings.exr_codec = "NONE" if multilayer else "ZIP"
+    settings.exr_codec = "NONE"  # files that are read again at once; packing takes longer
     settings.color_management = "FOLLOW_SCENE"
 
 

@@ -31,6 +31,9 @@ SAMPLES = 4
 HOT = 1e-3
 HOT_SAMPLES = 256
 BLOCK = 64
+# Of the world that is seen behind everything, and the noise at which a pixel has enough.
+BACKGROUND_SAMPLES = 64
+BACKGROUND_NOISE = 0.002
 
 
 def check_world(scene: bpy.types.Scene) -> None:
@@ -160,9 +163,7 @@ def _hot_blocks(image: NDArray[np.float32]) -> list[Region]:
         for x in range(0, hot.shape[1], BLOCK):
             rows, columns = np.nonzero(hot[y : y + BLOCK, x : x + BLOCK])
             if len(rows):
-                top, left = int(rows.min()), int(columns.min())
-                width, height = int(columns.max()) + 1 - left, int(rows.max()) + 1 - top
-                found.append(Region(x + left, y + top, width, height))
+                found.append(Region.around(rows + y, columns + x))
     return found
 
 
@@ -198,8 +199,12 @@ def bake(scene: bpy.types.Scene, width: int) -> Environment:
     return Environment(image)
 
 
-def background(scene: bpy.types.Scene) -> NDArray[np.float32]:
-    """The world as the artist's camera sees it behind everything -> (H, W, 3)."""
+def background(scene: bpy.types.Scene, region: Region | None = None) -> NDArray[np.float32]:
+    """The world as the artist's camera sees it behind everything -> (H, W, 3).
+
+    region: all that is looked at, 0 outside (default: everything). Pixels get as many samples as
+    they need, up to `BACKGROUND_SAMPLES`: next to none in an even sky, all on the rim of a sun.
+    """
     check_world(scene)
     with _studio(scene, "ARTO Background") as (studio, _):
         studio.camera = scene.camera
@@ -211,5 +216,12 @@ def background(scene: bpy.types.Scene) -> NDArray[np.float32]:
         studio.cycles.pixel_filter_type = scene.cycles.pixel_filter_type
         studio.cycles.filter_width = scene.cycles.filter_width
         studio.cycles.film_exposure = scene.cycles.film_exposure
-        studio.cycles.samples = 64
-        return _render(studio)[..., :3]
+        studio.cycles.samples = BACKGROUND_SAMPLES
+        studio.cycles.use_adaptive_sampling = True
+        studio.cycles.adaptive_threshold = BACKGROUND_NOISE
+        studio.cycles.adaptive_min_samples = 8
+        region = region or Region(0, 0, width, height)
+        set_region(studio, region)
+        out = np.zeros((height, width, 3), np.float32)
+        out[region.slices] = _render(studio)[..., :3]
+        return out

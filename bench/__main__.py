@@ -56,6 +56,8 @@ def _models(options: argparse.Namespace) -> None:
 def _accuracy(options: argparse.Namespace) -> None:
     import json as reader
 
+    from arto.core.choice import CHOICES, SEARCH
+
     from . import accuracy_report as report
     from . import scenes
     from .accuracy import accuracy, all_worlds
@@ -65,6 +67,8 @@ def _accuracy(options: argparse.Namespace) -> None:
         options.worlds = options.worlds or ["courtyard", "city", "sky35"]
         options.turns = [0.0]
         options.width, options.time_width, options.many = 64, 96, 256
+    # the search takes longer than all others together
+    choices = [c for c in CHOICES if c != SEARCH or not options.quick]
     size, time_size = ((w, w * 3 // 4) for w in (options.width, options.time_width))
     worlds = all_worlds(options.worlds, options.turns)
     rows = accuracy(
@@ -75,6 +79,8 @@ def _accuracy(options: argparse.Namespace) -> None:
         time_size,
         options.samples,
         options.many,
+        options.lamp_samples,
+        choices,
     )
     print(report.table(rows, options.samples), "\n")
     print(report.summary(rows, options.samples), "\n")
@@ -85,7 +91,8 @@ def _accuracy(options: argparse.Namespace) -> None:
     there = {(r["scene"], r["hdri"]) for r in rows}
     cases = [(s, w) for s in times for w in worlds if (s, w.label) in there and not w.degrees]
     picked = [(s, w) for s, w in cases if shown.get(s) == w.name] or cases[:2]
-    report.sheet(options.sheet, picked, times, rows, size, options.samples, options.many)
+    lamps = options.lamp_samples
+    report.sheet(options.sheet, picked, times, rows, size, options.samples, options.many, lamps)
     print(f"look at {options.plot} and {options.sheet}")
 
 
@@ -162,6 +169,7 @@ def main() -> int:
     c.add_argument("--time-width", type=int, default=320, help="of the renders for seconds")
     c.add_argument("--samples", type=int, default=128)
     c.add_argument("--many", type=int, default=512, help="samples of each of two references")
+    c.add_argument("--lamp-samples", type=int, help="of a relight's lamps (default: the add-on's)")
     c.add_argument("--plot", type=Path, default=Path("out/accuracy.png"))
     c.add_argument("--sheet", type=Path, default=Path("out/accuracy_sheet.png"))
     c.set_defaults(run=_accuracy)

@@ -12,7 +12,7 @@ import json
 import math
 import tempfile
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,7 @@ import numpy as np
 from arto.arto_addon import capture, denoise, fit, paths, relight, work
 from arto.arto_addon.world import bake
 from arto.core import exr, lamps, matte, metrics
-from arto.core.choice import CHOICES, SEARCH
+from arto.core.choice import CHOICES
 from arto.core.environment import Environment
 from arto.core.field import Field
 from arto.core.light import PatchLight
@@ -139,32 +139,42 @@ def times(scene_name: str, size: tuple[int, int], samples: int) -> Times:
 
 
 class Shot:
-    """One scene, captured and fitted in every way."""
+    """One scene, captured and fitted; lamp_samples: None for the add-on's default."""
 
-    def __init__(self, scene_name: str, size: tuple[int, int], samples: int) -> None:
+    def __init__(
+        self,
+        scene_name: str,
+        size: tuple[int, int],
+        samples: int,
+        lamp_samples: int | None = None,
+    ) -> None:
         self.name, self.size, self.samples = scene_name, size, samples
+        self.lamp_samples = lamp_samples
         self.folder = captured(scene_name, size, samples).folder.parents[1].resolve()
         scene = self.scene()
         work.run(fit.fit(scene))
         self.fields = {ARTO: Field(paths.field_folder(scene))}
-        rich = captured(
-            scene_name, size, samples, patterns="moments_uv", grain=True, adaptive=False
-        )
-        for choice in CHOICES:
-            if choice != SEARCH:  # minutes a scene; `bench models` has it
-                self.fields[choice] = fitted(rich, choice)
-        fine = captured(scene_name, size, samples, patterns="white", patches=16, adaptive=False)
+        self.guides = denoise.guides_of(self.fields[ARTO])
+
+    def fit_baselines(self, choices: Iterable[str]) -> None:
+        """Fit every other method's field, of captures of the same samples."""
+        options = {"patterns": "moments_uv", "grain": True, "adaptive": False}
+        rich = captured(self.name, self.size, self.samples, **options)
+        for choice in choices:
+            self.fields[choice] = fitted(rich, choice)
+        options = {"patterns": "white", "patches": 16, "adaptive": False}
+        fine = captured(self.name, self.size, self.samples, **options)
         self.fields[STAGE] = fitted(fine, "whole")
         data = rich.read(0)
         basis = data.basis.reshape(*data.basis.shape[:2], -1, 3)
         self.caps = matte.fit(basis, rich.patterns, rich.hemicube)
-        self.cubes = {name: f.hemicube for name, f in self.fields.items()}
-        self.guides = denoise.guides_of(self.fields[ARTO])
 
     def scene(self) -> bpy.types.Scene:
         """The scene anew, with the folder of its capture."""
         scene = reference.new_scene(self.name, *self.size)
         scene.arto.samples, scene.arto.folder = self.samples, str(self.folder)
+        if self.lamp_samples is not None:
+            scene.arto.lamp_samples = self.lamp_samples
         return scene
 
     def arto(self, world: World, **settings: Any) -> NDArray[np.float32]:
@@ -183,7 +193,7 @@ class Shot:
         out = {ARTO: self.arto(world), RAW: self.arto(world, denoise=False)}
         lights: dict[Any, PatchLight] = {}
         for name, field in self.fields.items():
-            cube = self.cubes[name]
+            cube = field.hemicube
             if cube not in lights:
                 lights[cube] = PatchLight(environment, cube)
             picture = relight_field(field, lights[cube])[..., :3]
@@ -336,9 +346,12 @@ def accuracy(
     time_size: tuple[int, int],
     samples: int,
     many: int,
+    lamp_samples: int | None = None,
+    choices: Sequence[str] = CHOICES,
 ) -> list[dict[str, Any]]:
     """All rows; those that `out` holds of the same code and options are kept."""
     setup = {"size": size, "time": time_size, "samples": samples, "many": many, "code": code_key()}
+    setup |= {"lamp_samples": lamp_samples, "choices": choices}
     state = out.with_suffix(".state.json")
     text = json.dumps(setup)
     there = json.loads(state.read_text()) if state.is_file() else {}
@@ -367,7 +380,8 @@ def accuracy(
         if not missing:
             continue
         measured = Times(**there["times"][scene_name])
-        shot = Shot(scene_name, size, samples)
+        shot = Shot(scene_name, size, samples, lamp_samples)
+        shot.fit_baselines(choices)
         for world in missing:
             if world not in maps:
                 scene = shot.scene()

@@ -93,12 +93,17 @@ def summary(rows: Rows, samples: int) -> str:
     own = pick(rows, ARTO, samples)
     over = {k: r["mean_relative_error"] - r["noise_floor"] for k, r in own.items()}
     worst = max(over, key=lambda k: over[k])
+    them = pick(rows, RENDER_DENOISED, 128)
+    behind = {k: r["mean_relative_error"] - them[k]["mean_relative_error"] for k, r in own.items()}
+    last = max(behind, key=lambda k: behind[k])
     counts = [r["break_even"] for r in own.values()]
     paid = sorted(np.inf if c is None else c for c in counts)
     ratio = [r["capture_seconds"] / r["plain_render_seconds"] for r in own.values()]
     lines = [
         f"- over the noise floor: median {median(over.values()):.3f}, worst {over[worst]:.3f} "
         f"({', '.join(worst)}), of {len(over)} cases",
+        f"- over a denoised render of 128 samples: median {median(behind.values()):.3f}, worst "
+        f"{behind[last]:.3f} ({', '.join(last)})",
         f"- break-even: median {median(paid):g} relights; never in "
         f"{sum(c is None for c in counts)} of {len(counts)}",
         f"- capture of {samples} samples: {min(ratio):.2f} to {max(ratio):.2f} times a plain "
@@ -189,6 +194,7 @@ def sheet(
     size: tuple[int, int],
     samples: int,
     many: int,
+    lamp_samples: int | None = None,
     relights: int = 5,
 ) -> None:
     """Reference, ARTO and a denoised render of the same total time, with error maps."""
@@ -197,7 +203,7 @@ def sheet(
     )
     own = pick(rows, ARTO, samples)
     for line, (scene_name, world) in zip(axes, cases, strict=True):
-        shot = Shot(scene_name, size, samples)
+        shot = Shot(scene_name, size, samples, lamp_samples)
         measured = Times(**times[scene_name])
         row = own[scene_name, world.label]
         once = row["capture_seconds"] + row["fit_seconds"]

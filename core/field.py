@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -34,6 +33,12 @@ class Region:
     y: int
     width: int
     height: int
+
+    @staticmethod
+    def around(rows: NDArray, columns: NDArray) -> Region:
+        """The smallest one with these pixels in it."""
+        x, y = int(columns.min()), int(rows.min())
+        return Region(x, y, int(columns.max()) + 1 - x, int(rows.max()) + 1 - y)
 
     @property
     def pixels(self) -> int:
@@ -191,9 +196,10 @@ class Tile:
     def has_layer(self, name: str) -> bool:
         return (self.folder / f"{name}.npy").is_file()
 
-    def entries(self) -> Iterator[tuple[int, list[Entries]]]:
-        """Every patch with its entries, model by model."""
-        arrays, scales = {}, self._load("scales", (self.patches,))
+    @cached_property
+    def _arrays(self) -> dict[int, tuple[NDArray, NDArray, NDArray[np.intp]]]:
+        """By model code: coefficients, parameters, and where in them each patch begins (K + 1,)."""
+        out = {}
         for name, count in self.used.items():
             support = next((s for s in BY_CODE.values() if s.name == name), None)
             if support is None:
@@ -201,31 +207,38 @@ class Tile:
                     f"{self.folder} uses the support model '{name}', which this version does "
                     "not know: update ARTO, or fit again"
                 )
-            arrays[support.code] = (
+            counts = [np.count_nonzero(row == support.code) for row in self.codes]
+            starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.intp)
+            if starts[-1] != count:
+                raise FieldError(f"{self.folder} is damaged, its counts differ: fit again")
+            out[support.code] = (
                 self._load(f"{name}_coefficient", (count, 3)),
                 self._load(f"{name}_parameters", (count, len(support.parameters))),
+                starts,
             )
-        at = dict.fromkeys(arrays, 0)
-        for k in range(self.patches):
-            codes = np.asarray(self.codes[k])
-            found = []
-            for code, (coefficient, parameters) in arrays.items():
-                pixels = np.flatnonzero(codes == code)
-                if not len(pixels):
-                    continue
-                rows = slice(at[code], at[code] + len(pixels))
-                at[code] += len(pixels)
-                if at[code] > len(coefficient):
-                    raise FieldError(f"{self.folder} is damaged, its counts differ: fit again")
-                found.append(
-                    Entries(
-                        BY_CODE[code],
-                        pixels,
-                        coefficient[rows].astype(np.float32) * scales[k],
-                        parameters[rows].astype(np.float32) / np.float32(65535),
-                    )
+        return out
+
+    @cached_property
+    def _scales(self) -> NDArray[np.float32]:
+        return np.asarray(self._load("scales", (self.patches,)))
+
+    def entries(self, k: int) -> list[Entries]:
+        """The entries of patch k, model by model."""
+        codes = np.asarray(self.codes[k])
+        found = []
+        for code, (coefficient, parameters, starts) in self._arrays.items():
+            rows = slice(starts[k], starts[k + 1])
+            if rows.start == rows.stop:
+                continue
+            found.append(
+                Entries(
+                    BY_CODE[code],
+                    np.flatnonzero(codes == code),
+                    coefficient[rows].astype(np.float32) * self._scales[k],
+                    parameters[rows].astype(np.float32) / np.float32(65535),
                 )
-            yield k, found
+            )
+        return found
 
 
 class Field:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,6 +101,7 @@ class PatchLight:
             samples = np.repeat(np.repeat(texels, finer, axis=0), finer, axis=1).ravel()[lit]
             flat[:, c] = np.bincount(index, samples * solid_angle, size)
         self._fill_empty(environment)
+        self._lock = Lock()
         self._polynomials: dict[tuple[int, ...], NDArray[np.float64]] = {}
         self._sat = np.zeros((int(self._tables[-1]), 4))
         for k, r in enumerate(self.resolutions):
@@ -160,7 +162,9 @@ class PatchLight:
         which: indices into `patterns.MONOMIALS` -> coefficients (K, len(which), 3). Light that is
         such a polynomial is met exactly, and so then is the pixel: it is a sum of moments.
         """
-        if which not in self._polynomials:
+        with self._lock:  # threads that relight come here at once
+            if which in self._polynomials:
+                return self._polynomials[which]
             out = np.empty((len(self.hemicube), len(which), 3))
             for k in range(len(self.hemicube)):
                 u, v = self.bin_centres(k)
@@ -169,7 +173,7 @@ class PatchLight:
                 gram = (m * light[:, 3]) @ m.T
                 out[k] = np.linalg.solve(gram, m @ light[:, :3])
             self._polynomials[which] = out
-        return self._polynomials[which]
+            return out
 
     def box(
         self, k: int | NDArray, u0: NDArray, u1: NDArray, v0: NDArray, v1: NDArray

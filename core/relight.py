@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 from numpy.typing import NDArray
 
-from .field import Field
+from .field import Field, Tile
 from .light import PatchLight
+
+# Patches are added up in so many sums, each in a thread. As many on every machine: the order of a
+# sum is in its last digits, and the same field gives the same picture everywhere.
+SUMS = 8
 
 
 def relight(field: Field, light: PatchLight, own: float = 1.0) -> NDArray[np.float32]:
@@ -17,16 +24,34 @@ def relight(field: Field, light: PatchLight, own: float = 1.0) -> NDArray[np.flo
     """
     out = np.zeros((*field.shape, 4), np.float32)
     for tile in field.tiles:
-        colour = np.zeros((tile.region.pixels, 3), np.float32)
-        for k, found in tile.entries():
-            for e in found:
-                radiance = e.support.average(light, k, e.parameters)
-                colour[e.pixels] += e.coefficient * radiance.astype(np.float32, copy=False)
+        colour = _light(tile, light)
         picture = colour.reshape(tile.region.height, tile.region.width, 3)
         if own:
             picture = picture + np.float32(own) * tile.layer("own")
         out[tile.region.slices] = np.dstack([picture, tile.layer("alpha")])
     return out
+
+
+def _light(tile: Tile, light: PatchLight) -> NDArray[np.float32]:
+    """The light of all patches on the pixels of a tile -> (n, 3)."""
+    tile.entries(0)  # opens the files, which may fail, once and here
+
+    def some(first: int) -> NDArray[np.float32]:
+        # channel by channel: numpy is three times as fast at adding into a row as into columns
+        out = np.zeros((3, tile.region.pixels), np.float32)
+        for k in range(first, tile.patches, SUMS):
+            for e in tile.entries(k):
+                radiance = e.support.average(light, k, e.parameters)
+                light_of = e.coefficient * radiance.astype(np.float32, copy=False)
+                for channel, values in zip(out, light_of.T, strict=True):
+                    channel[e.pixels] += values
+        return out
+
+    with ThreadPoolExecutor(min(SUMS, os.cpu_count() or 1)) as pool:
+        total, *others = pool.map(some, range(SUMS))
+    for other in others:
+        total += other
+    return total.T
 
 
 def over(plate: NDArray, background: NDArray) -> NDArray[np.float32]:

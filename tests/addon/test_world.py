@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from arto.arto_addon import world
 from arto.core.errors import SceneError
+from arto.core.field import Region
 from scene_tools import set_colour
 
 
@@ -75,12 +76,11 @@ def test_mix_of_worlds_adds_up(scene):
     np.testing.assert_allclose(image, np.broadcast_to([0.75, 0.5, 0], image.shape), atol=1e-5)
 
 
-@pytest.mark.parametrize("elevation", [60, 15, 3])
-def test_sun_of_half_a_degree_keeps_its_energy(scene, elevation):
-    """A disc of light of half a degree, of known radiance, drawn by nodes: its integral is known
-    in closed form. To 1%."""
+def sun(scene, elevation, azimuth=0.7321):
+    """A disc of light of half a degree, of known radiance, drawn by nodes; its irradiance, which is
+    known in closed form. Angles in radians."""
     size, radiance = math.radians(0.53), 1e5
-    e, a = math.radians(elevation), 0.7321
+    e, a = elevation, azimuth
     direction = (math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e))
     tree = scene.world.node_tree
     coordinates = tree.nodes.new("ShaderNodeTexCoord")
@@ -99,11 +99,35 @@ def test_sun_of_half_a_degree_keeps_its_energy(scene, elevation):
     scale.inputs[1].default_value = radiance
     tree.links.new(inside.outputs[0], scale.inputs[0])
     tree.links.new(scale.outputs[0], background.inputs["Strength"])
-    found = world.bake(scene, 1024).irradiance()
     # float32 cos(size / 2), as the node compares it
     cosine = float(np.float32(math.cos(size / 2)))
-    expected = radiance * 2 * math.pi * (1 - cosine)
-    np.testing.assert_allclose(found, expected, rtol=0.01)
+    return radiance * 2 * math.pi * (1 - cosine)
+
+
+@pytest.mark.parametrize("elevation", [60, 15, 3])
+def test_sun_of_half_a_degree_keeps_its_energy(scene, elevation):
+    expected = sun(scene, math.radians(elevation))
+    np.testing.assert_allclose(world.bake(scene, 1024).irradiance(), expected, rtol=0.01)
+
+
+def test_sun_that_is_seen_behind_keeps_its_energy(scene):
+    """Few samples in an even sky must not mean few on the rim of a sun. To 1%; and a part of the
+    background is that part of all of it."""
+    expected = sun(scene, 0.1, 0.02)
+    scene.camera.rotation_euler = (math.pi / 2 + 0.1, 0, -math.pi / 2 + 0.02)
+    scene.camera.data.angle = math.radians(12)
+    scene.render.resolution_x, scene.render.resolution_y = 64, 48
+    scene.render.resolution_percentage = 100
+    picture = world.background(scene)
+    pixel = (2 * math.tan(math.radians(6)) / 64) ** 2  # its solid angle in the middle
+    np.testing.assert_allclose(picture.sum(axis=(0, 1)) * pixel, expected, rtol=0.01)
+    region = Region(30, 10, 20, 16)
+    part = world.background(scene, region)
+    inside = np.zeros(part.shape, bool)
+    inside[region.slices] = True
+    assert (part[~inside] == 0).all() and part.max() > 1e4
+    rim = (picture > 1) & (picture < 9.9e4)  # another seed there
+    np.testing.assert_allclose(part[inside & ~rim], picture[inside & ~rim], rtol=1e-4)
 
 
 def test_sky_texture_with_its_sun(scene):

@@ -29,7 +29,7 @@ def capture(tmp_path: Path, scene, write_scene) -> Path:
 
 def entries_of(field: Field, k: int) -> dict[int, tuple[np.ndarray, np.ndarray]]:
     """Pixel -> (R, parameters) of one patch of a field of one tile."""
-    _, found = list(field.tiles[0].entries())[k]
+    found = field.tiles[0].entries(k)
     return {
         int(pixel): (e.coefficient[n], e.parameters[n])
         for e in found

@@ -1,0 +1,48 @@
+"""What the panel says is there, against what is."""
+
+from __future__ import annotations
+
+import os
+
+import bpy
+from arto.arto_addon import fit, paths, status, work
+from scene_tools import captured, small_scene
+
+
+def test_lines_follow_the_files(tmp_path):
+    scene = small_scene(tmp_path)
+    assert status.capture_line(scene) is None and status.field_line(scene) is None
+    there = captured(scene)
+    folder, patches = there.folder, len(there.hemicube)
+    expected = (f"{patches} patches, {scene.arto.samples} samples", True)
+    assert status.capture_line(scene) == expected
+    assert status.field_line(scene) is None
+    work.run(fit.fit(scene))
+    assert status.field_line(scene) == (f"{patches} patches, auto", True)
+    # another shot, and back
+    scene.frame_set(7)
+    for line in (status.capture_line(scene), status.field_line(scene)):
+        assert line == ("is of another frame (1, now 7): capture again", False)
+    scene.frame_set(1)
+    assert status.capture_line(scene) == expected
+    # captured anew since it was fitted
+    later = (paths.field_folder(scene) / "field.json").stat().st_mtime_ns + 10**9
+    os.utime(folder / "capture.json", ns=(later, later))
+    assert status.field_line(scene) == ("of an earlier capture: fit again", False)
+    # a capture that was stopped, and no other
+    folder.rename(paths.unfinished_capture_folder(scene))
+    head = paths.unfinished_capture_folder(scene) / "capture.json"
+    head.write_text(head.read_text().replace('"done": true', '"done": false'))
+    text, serves = status.capture_line(scene) or ("", False)
+    assert text.startswith("unfinished, 0 of 1 tiles") and serves
+    head.write_text("{")
+    os.utime(head, ns=(later, later))
+    assert status.capture_line(scene) is None
+
+
+def test_a_file_that_was_never_saved(tmp_path):
+    scene = small_scene(tmp_path)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    scene = bpy.context.scene
+    scene.arto.folder = "//arto/"
+    assert status.capture_line(scene) is None and status.field_line(scene) is None
