@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import json
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -124,15 +125,10 @@ class CaptureSet:
         guides: dict[str, NDArray] = {}
         for name in self.files[tile]:
             path = self.folder / name
-            try:
-                parts = exr.read(path)
-            except ExrError as e:
-                raise CaptureSetError(f"{e} (run Capture again)") from e
             lit = np.zeros((*shape, 3))
             here = np.zeros(basis.shape[:2], bool)
             combined: NDArray | None = None
-            for part in list(parts):
-                pixels = parts.pop(part)
+            for part, pixels in self._parts(path):
                 match = GROUP.search(part)
                 if match:
                     key = (int(match[1]), match[2])
@@ -179,6 +175,13 @@ class CaptureSet:
                 np.subtract(2 * image, white, out=image)
         own = np.maximum(own, 0).astype(np.float32)
         return TileData(region, basis, own, alpha, guides, grain)
+
+    @staticmethod
+    def _parts(path: Path) -> Iterator[tuple[str, NDArray]]:
+        try:
+            yield from exr.parts(path)
+        except ExrError as e:
+            raise CaptureSetError(f"{e} (run Capture again)") from e
 
     @staticmethod
     def _checked(path: Path, part: str, pixels: NDArray, shape: tuple[int, ...]) -> NDArray:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import mmap
 import struct
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -117,14 +118,17 @@ def header(path: Path) -> dict[str, Any]:
 
 
 def read(path: Path) -> dict[str, NDArray]:
-    """All parts of a file: part name -> (H, W, C), C as R, G, B(, A), or one channel.
+    """All parts of a file by name; see `parts`."""
+    return dict(parts(path))
+
+
+def parts(path: Path) -> Iterator[tuple[str, NDArray]]:
+    """The parts of a file, one by one: name, and (H, W, C), C as R, G, B(, A), or one channel.
 
     A part's name loses nothing; channel names lose their prefix. Raises ExrError for a file that
     is missing, truncated, or has parts of odd channels.
     """
-    file = _open(path, header_only=False)
-    out: dict[str, NDArray] = {}
-    for part in file.parts:
+    for part in _open(path, header_only=False).parts:
         channels = {str(name).rsplit(".", 1)[-1]: ch.pixels for name, ch in part.channels.items()}
         order = sorted(channels, key=lambda c: (_ORDER.find(c) if c in _ORDER else len(_ORDER), c))
         if any(pixels is None for pixels in channels.values()):
@@ -138,8 +142,7 @@ def read(path: Path) -> dict[str, NDArray]:
                 f"{path} has channels {sorted(map(str, part.channels))}: expected R, G, B "
                 "or one a part; save its layers as parts, or as files of their own"
             )
-        out[str(part.header.get("name", ""))] = pixels
-    return out
+        yield str(part.header.get("name", "")), pixels
 
 
 def write(
