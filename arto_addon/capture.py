@@ -34,10 +34,13 @@ from .bounds import scene_bounds
 from .probe import refined
 from .stage import Stage, float_exr, picture_size, set_region, stage
 from .work import Progress, Render, Steps
+from .world import check_no_volume
 
 # Cycles and Blender's result each hold a group's pass: 3 floats, twice.
 BYTES_PER_PASS = 24
 OTHER_PASSES = 8
+# Blender itself renders none smaller, denoising and the world behind included.
+LEAST_PIXELS = 4
 # How many times as many patches as the grid has the probe may hand out.
 ADAPTIVE_SHARE = 2
 
@@ -51,14 +54,13 @@ def check_scene(scene: bpy.types.Scene) -> None:
         )
     if scene.camera is None:
         raise SceneError("the scene has no camera: add one, or make one the scene's camera")
-    world = scene.world
-    if world and world.node_tree:
-        out = world.node_tree.get_output_node("CYCLES")
-        if out and out.inputs["Volume"].is_linked:
-            raise SceneError(
-                "the world has a volume, which would swallow the light of far patches: put the "
-                "fog into an object around the scene instead"
-            )
+    if scene.world:
+        check_no_volume(scene.world)
+    width, height = picture_size(scene)
+    if min(width, height) < LEAST_PIXELS:
+        raise SceneError(
+            f"the picture has only {width}x{height} pixels: raise the resolution or its percentage"
+        )
     things = list(scene.objects)
     things += [
         o for e in things if e.instance_collection for o in e.instance_collection.all_objects
@@ -127,16 +129,30 @@ def shot(scene: bpy.types.Scene) -> dict[str, Any]:
         "width": width,
         "height": height,
         "camera": [round(x, 5) for row in camera.matrix_world for x in row] if camera else [],
+        "lens": _lens(scene),
     }
+
+
+def _lens(scene: bpy.types.Scene) -> list[Any]:
+    """What of the camera decides the framing, beside where it stands."""
+    if not scene.camera or scene.camera.type != "CAMERA":
+        return []
+    lens, render = scene.camera.data, scene.render
+    kind = lens.type
+    names = ["shift_x", "shift_y", "sensor_fit", "sensor_width", "sensor_height"]
+    names += {"PERSP": ["lens"], "ORTHO": ["ortho_scale"]}.get(kind, ["panorama_type"])
+    values = [getattr(lens, name) for name in names]
+    values += [render.pixel_aspect_x, render.pixel_aspect_y]
+    return [kind, *(round(v, 5) if isinstance(v, float) else v for v in values)]
 
 
 def check_same_shot(scene: bpy.types.Scene, head: dict[str, Any], what: str) -> None:
     """Raise CaptureSetError where a capture set or field is of another shot than the scene's."""
     now = shot(scene)
     then = head.get("shot", {})
-    for key in ("scene", "width", "height", "frame", "camera"):
+    for key in ("scene", "width", "height", "frame", "camera", "lens"):
         if key in then and then[key] != now[key]:
-            shown = "" if key == "camera" else f" ({then[key]}, now {now[key]})"
+            shown = "" if key in ("camera", "lens") else f" ({then[key]}, now {now[key]})"
             raise CaptureSetError(
                 f"{what} is of another {key}{shown}: set it back, or capture and fit again"
             )
@@ -211,6 +227,8 @@ def _finish(unfinished: Path, folder: Path) -> None:
     old = folder.with_name(folder.name + ".old")
     try:
         if folder.exists():
+            if old.exists():  # a crash left it
+                shutil.rmtree(old)
             folder.replace(old)
         unfinished.replace(folder)
         if old.exists():

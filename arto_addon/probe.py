@@ -14,7 +14,7 @@ from ..core.capture_set import GROUP
 from ..core.errors import CaptureSetError
 from ..core.hemicube import FINEST, Hemicube
 from ..core.patterns import pattern_set
-from ..core.refine import refine
+from ..core.refine import check, refine
 from . import hemicube_planes
 from .stage import Stage
 from .work import Render, Steps
@@ -29,6 +29,7 @@ def refined(on: Stage, hemicube: Hemicube, most: int) -> Steps:
 
     Raises CancelledError, CaptureSetError, ExrError, HemicubeError; the stage is left as it was.
     """
+    check(hemicube)
     scene = on.scene
     render, cycles = scene.render, scene.cycles
     fine = replace(hemicube, patches=FINEST)

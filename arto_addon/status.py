@@ -17,15 +17,16 @@ from .capture import check_same_shot
 _read: dict[Path, tuple[int, dict[str, Any]]] = {}
 
 
-def _description(path: Path) -> dict[str, Any] | None:
-    """A description on disk, or None where there is none that can be read."""
+def _description(path: Path) -> dict[str, Any]:
+    """A description on disk, empty where there is none that can be read."""
     try:
         changed = path.stat().st_mtime_ns
-        if _read.get(path, (0, {}))[0] != changed:
-            _read[path] = (changed, json.loads(path.read_text()))
+        if path not in _read or _read[path][0] != changed:
+            found = json.loads(path.read_text())
+            _read[path] = (changed, found if isinstance(found, dict) else {})
         return _read[path][1]
     except (OSError, ValueError):
-        return None
+        return {}
 
 
 def capture_line(scene: bpy.types.Scene) -> tuple[str, bool] | None:
@@ -35,12 +36,15 @@ def capture_line(scene: bpy.types.Scene) -> tuple[str, bool] | None:
         begun = _description(paths.unfinished_capture_folder(scene) / capture_set.HEADER)
     except ArtoError:
         return None
-    if there is None and begun is not None:
-        tiles = begun.get("tiles", [])
+    if begun and not there:
+        tiles = begun.get("tiles") or []
         done = sum(bool(t.get("done")) for t in tiles)
-        return f"unfinished, {done} of {len(tiles)} tiles: Capture goes on", True
-    if there is None:
+        # whether Capture goes on with it hangs on every setting
+        return f"unfinished, {done} of {len(tiles)} tiles", False
+    if not there:
         return None
+    if there.get("version") != capture_set.VERSION:
+        return "of another version: capture again", False
     text = f"{there.get('patches')} patches, {there.get('samples')} samples"
     return _of_this_shot(scene, there, text)
 
@@ -53,7 +57,7 @@ def field_line(scene: bpy.types.Scene) -> tuple[str, bool] | None:
         captured = paths.capture_folder(scene) / capture_set.HEADER
     except ArtoError:
         return None
-    if there is None:
+    if not there:
         return None
     try:
         older = path.stat().st_mtime_ns < captured.stat().st_mtime_ns
@@ -61,7 +65,9 @@ def field_line(scene: bpy.types.Scene) -> tuple[str, bool] | None:
         older = False  # a field needs no capture set any more
     if older:
         return "of an earlier capture: fit again", False
-    about = there.get("about", {})
+    if there.get("version") != field.VERSION:
+        return "of another version: fit again", False
+    about = there.get("about") or {}
     text = f"{there.get('patches')} patches, {about.get('choice')}"
     return _of_this_shot(scene, about, text)
 

@@ -43,6 +43,7 @@ def check_world(scene: bpy.types.Scene) -> None:
         raise SceneError(
             "the scene has no world to relight with: add one with an HDRI (World properties)"
         )
+    check_no_volume(world)
     for tree in _trees(world.node_tree, set()):
         for node in tree.nodes:
             if node.bl_idname not in {"ShaderNodeTexEnvironment", "ShaderNodeTexImage"}:
@@ -58,6 +59,16 @@ def check_world(scene: bpy.types.Scene) -> None:
                         f"the world's image '{image.name}' is missing on disk ({path}): find it "
                         "again (File, External Data, Find Missing Files), or choose another"
                     )
+
+
+def check_no_volume(world: bpy.types.World) -> None:
+    """Raise SceneError for a world filled with fog: it swallows light from afar, an HDRI's too."""
+    out = world.node_tree.get_output_node("CYCLES") if world.node_tree else None
+    if out and out.inputs["Volume"].is_linked:
+        raise SceneError(
+            "the world has a volume, which swallows all light from afar: put the fog into an "
+            "object around the scene instead"
+        )
 
 
 def _trees(tree: Any, seen: set[int]) -> Iterator[Any]:

@@ -92,8 +92,9 @@ def _accuracy(options: argparse.Namespace) -> None:
     cases = [(s, w) for s in times for w in worlds if (s, w.label) in there and not w.degrees]
     picked = [(s, w) for s, w in cases if shown.get(s) == w.name] or cases[:2]
     lamps = options.lamp_samples
-    report.sheet(options.sheet, picked, times, rows, size, options.samples, options.many, lamps)
-    print(f"look at {options.plot} and {options.sheet}")
+    if picked:  # turned worlds alone are not on the sheet
+        report.sheet(options.sheet, picked, times, rows, size, options.samples, options.many, lamps)
+    print(f"look at {options.plot}" + (f" and {options.sheet}" if picked else ""))
 
 
 def _noise(options: argparse.Namespace) -> None:

@@ -1,8 +1,7 @@
 """Error against time: ARTO, its baselines and re-rendering, on every scene under every world.
 
-Errors are taken in pictures of one size, seconds in renders of another, larger one, where what a
-render costs once (building the scene, the map of a world) no longer hides what a sample costs. Rows
-are written after each world, and a run that was stopped goes on where it was.
+What is measured once a scene, seconds, is in `seconds`. Rows are written after each world, and a
+run that was stopped goes on where it was.
 """
 
 from __future__ import annotations
@@ -11,16 +10,15 @@ import hashlib
 import json
 import math
 import tempfile
-import time
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import arto
 import bpy
 import numpy as np
-from arto.arto_addon import capture, denoise, fit, paths, relight, work
+from arto.arto_addon import denoise, fit, paths, relight, work
 from arto.arto_addon.world import bake
 from arto.core import exr, lamps, matte, metrics
 from arto.core.choice import CHOICES
@@ -33,36 +31,22 @@ from numpy.typing import NDArray
 from . import reference, scenes, worlds
 from .machine import write_rows
 from .models import MATTE, STAGE, captured, fitted
+from .seconds import (
+    ARTO,
+    NO_LAMPS,
+    RAW,
+    RENDER,
+    RENDER_DENOISED,
+    STAGE_DENOISED,
+    Times,
+    price,
+    times,
+)
 from .worlds import World
 
-ARTO, RAW, NO_LAMPS = "arto", "arto, not denoised", "arto, no lamps"
-RENDER, RENDER_DENOISED = "render", "render denoised"
 SAMPLES = (8, 32, 128)  # of the renders that ARTO is held against
 SEED = 3  # theirs; references have 1 and 2
 RENDERS = reference.CACHE.with_name("renders")
-
-
-@dataclass(frozen=True)
-class Times:
-    """Seconds of one scene at the size for times; `a_sample` is what one more sample costs."""
-
-    capture: float
-    fit: float
-    relight: float
-    lamps: float
-    lamps_a_sample: float
-    render: float
-    render_a_sample: float
-    stage: float
-
-    def render_of(self, samples: float) -> float:
-        """A render of so many samples, denoised."""
-        return self.render + self.render_a_sample * samples
-
-    def relight_of(self, lamp_samples: int) -> float:
-        """A relight whose lamps take so many samples, 0 for none."""
-        extra = self.lamps + self.lamps_a_sample * lamp_samples if lamp_samples else 0.0
-        return self.relight + extra
 
 
 def code_key() -> str:
@@ -91,51 +75,6 @@ def rerendered(scene_name: str, world: World, size: tuple[int, int], samples: in
     np.save(partial, both)
     partial.replace(path)
     return both
-
-
-def seconds_of(work_to_do: Callable[[], Any]) -> float:
-    begun = time.perf_counter()
-    work_to_do()
-    return time.perf_counter() - begun
-
-
-def times(scene_name: str, size: tuple[int, int], samples: int) -> Times:
-    """Measure one scene: ARTO with its default settings, renders of few and of many samples."""
-    scene = reference.new_scene(scene_name, *size)
-    World("city").apply(scene)
-    reference.render(scene, 1, 0)  # the first pays for loading Cycles
-    few, many = (reference.render(scene, s, 0, denoise=True).seconds for s in (4, 36))
-    each = (many - few) / 32
-    with tempfile.TemporaryDirectory() as folder:
-        scene.arto.folder = folder
-        scene.arto.output = str(Path(folder) / "relit.exr")
-        layer = scene.view_layers[0].name
-        scene.arto.samples = samples
-        taken = seconds_of(lambda: work.run(capture.capture(scene, layer)))
-        fitting = seconds_of(lambda: work.run(fit.fit(scene)))
-        scene.arto.lamps = False
-        work.run(relight.relight(scene))
-        relit = seconds_of(lambda: work.run(relight.relight(scene)))
-        scene.arto.lamps = True
-        share = lamps.split(bake(scene, scene.arto.environment_width)).share
-        lit = []
-        for n in (4, 36):
-            scene.arto.lamp_samples = math.ceil(n / share)
-            lit.append(seconds_of(lambda: work.run(relight.relight(scene))))
-        light_sample = max((lit[1] - lit[0]) / 32, 0.0)
-        for name, value in {"patches": 16, "patterns": "white", "adaptive": False}.items():
-            setattr(scene.arto, name, value)
-        stage = seconds_of(lambda: work.run(capture.capture(scene, layer)))
-    return Times(
-        capture=taken,
-        fit=fitting,
-        relight=relit,
-        lamps=max(lit[0] - relit - 4 * light_sample, 0.0),
-        lamps_a_sample=light_sample,
-        render=max(few - 4 * each, 0.0),
-        render_a_sample=each,
-        stage=stage,
-    )
 
 
 class Shot:
@@ -202,7 +141,7 @@ class Shot:
             else:
                 out[name] = picture
             if name == STAGE:
-                out[f"{STAGE} denoised"] = denoise.denoise(self.guides, picture, clean=True)
+                out[STAGE_DENOISED] = denoise.denoise(self.guides, picture, clean=True)
             if name == "auto":
                 caps = matte.relight(self.caps, lights[cube])
                 out[MATTE] = caps.reshape(*self.size[::-1], 3)
@@ -244,32 +183,10 @@ def flip(picture: NDArray, truth: NDArray) -> float:
     return float(flip_evaluator.evaluate(truth, picture, "HDR", computeMeanError=True)[1])
 
 
-def break_even(
-    times: Times, capture: float, error: float, relight: float, rival: dict[int, float]
-) -> int | None:
-    """Relights after which capture and relights cost less than renders of the same error.
-
-    capture: seconds of capture and fit; rival: error of the denoised render by samples. Between
-    them it is a power of the samples; below the last, as many samples as that. None: never, a
-    relight costs more than such a render.
-    """
-    better: dict[float, int] = {}  # error -> the fewest samples that have it
-    for n in sorted(rival):
-        if not better or rival[n] < min(better):
-            better[rival[n]] = n
-    errors = sorted(better)
-    need = float(max(rival))
-    if error >= errors[0]:
-        at = np.interp(math.log(error), np.log(errors), np.log([better[e] for e in errors]))
-        need = math.exp(at)
-    saved = times.render_of(need) - relight
-    return math.ceil(capture / saved) if saved > 0 else None
-
-
 def world_rows(
-    shot: Shot, world: World, environment: Environment, many: int, measured: Times
+    shot: Shot, world: World, environment: Environment, many: int
 ) -> list[dict[str, Any]]:
-    """The rows of one scene under one world."""
+    """The rows of one scene under one world, without seconds."""
     made = shot.scene
     one, two = (
         reference.reference(shot.name, world, shot.size, many, seed, made) for seed in (1, 2)
@@ -291,14 +208,6 @@ def world_rows(
         is_render = method in (RENDER, RENDER_DENOISED)
         error = metrics.relative_error(picture, truth, seen).mean(axis=-1)
         both = metrics.relative_squares(picture, one.rgb, two.rgb, seen).mean(axis=-1)
-        cost = {"capture": 0.0, "fit": 0.0, "relight": measured.render_of(samples)}
-        if not is_render:
-            lit = lamp_samples if method in (ARTO, RAW) else 0
-            cost = {
-                "capture": measured.stage if method.startswith(STAGE) else measured.capture,
-                "fit": measured.fit,
-                "relight": measured.relight_of(lit),
-            }
         behind = np.where(seen[..., None], picture, truth).astype(np.float32)
         rows.append(
             {
@@ -323,18 +232,8 @@ def world_rows(
                 "lamp_share": split.share,
                 "lamp_samples": lamp_samples if method in (ARTO, RAW) else 0,
                 "bytes_per_pixel": 0.0 if is_render else shot.bytes_of(method),
-                "capture_seconds": cost["capture"],
-                "fit_seconds": cost["fit"],
-                "relight_seconds": cost["relight"],
-                "plain_render_seconds": measured.render_of(shot.samples),
             }
         )
-    rival = {r["samples"]: r["mean_relative_error"] for r in rows if r["method"] == RENDER_DENOISED}
-    for row in rows:
-        if row["method"] in (ARTO, RAW, NO_LAMPS):
-            error, relit = row["mean_relative_error"], row["relight_seconds"]
-            once = row["capture_seconds"] + row["fit_seconds"]
-            row["break_even"] = break_even(measured, once, error, relit, rival)
     return rows
 
 
@@ -352,6 +251,7 @@ def accuracy(
     """All rows; those that `out` holds of the same code and options are kept."""
     setup = {"size": size, "time": time_size, "samples": samples, "many": many, "code": code_key()}
     setup |= {"lamp_samples": lamp_samples, "choices": choices}
+    setup["scripts"] = [reference.content_key(scene=name) for name in scenes.SCENES]
     state = out.with_suffix(".state.json")
     text = json.dumps(setup)
     there = json.loads(state.read_text()) if state.is_file() else {}
@@ -363,6 +263,8 @@ def accuracy(
     world_list = list(world_list)
 
     def keep() -> None:
+        measured = {name: Times.from_json(t) for name, t in there["times"].items()}
+        price([r for r in rows if r["scene"] in measured], measured, samples)
         state.parent.mkdir(parents=True, exist_ok=True)
         partial = state.with_suffix(".part")
         partial.write_text(json.dumps(there))
@@ -379,7 +281,6 @@ def accuracy(
         missing = [w for w in world_list if (scene_name, w.label) not in done]
         if not missing:
             continue
-        measured = Times(**there["times"][scene_name])
         shot = Shot(scene_name, size, samples, lamp_samples)
         shot.fit_baselines(choices)
         for world in missing:
@@ -387,7 +288,7 @@ def accuracy(
                 scene = shot.scene()
                 world.apply(scene)
                 maps[world] = bake(scene, scene.arto.environment_width)
-            rows += world_rows(shot, world, maps[world], many, measured)
+            rows += world_rows(shot, world, maps[world], many)
             keep()
             print(f"{scene_name} {world.label} done", flush=True)
     return rows

@@ -12,24 +12,15 @@ import numpy as np
 from arto.core import metrics
 
 from . import pictures, reference
-from .accuracy import (
-    ARTO,
-    NO_LAMPS,
-    RAW,
-    RENDER,
-    RENDER_DENOISED,
-    Shot,
-    Times,
-    rerendered,
-)
+from .accuracy import Shot, rerendered
 from .models import MATTE, STAGE
+from .seconds import ARTO, NO_LAMPS, RAW, RENDER, RENDER_DENOISED, STAGE_DENOISED, Times
 from .worlds import World
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 Rows = list[dict[str, Any]]
-STAGE_DENOISED = f"{STAGE} denoised"
 
 
 def pick(rows: Rows, method: str, samples: int) -> dict[tuple[str, str], dict[str, Any]]:
@@ -155,6 +146,8 @@ def plot(path: Path, rows: Rows) -> None:
     """Error against seconds a picture, log-log, a curve a method: medians over all cases."""
     found: dict[str, dict[int, list[tuple[float, float]]]] = defaultdict(lambda: defaultdict(list))
     for r in rows:
+        if r["fit_seconds"] is None or r["relight_seconds"] is None:
+            continue
         once = r["capture_seconds"] + r["fit_seconds"]
         unit = r["plain_render_seconds"]
         if r["method"] in (RENDER, RENDER_DENOISED):
@@ -162,7 +155,7 @@ def plot(path: Path, rows: Rows) -> None:
         elif r["method"] == ARTO:
             name = f"{ARTO}, 1, 5 and 20 relights"
             curves = {(name, -n): once / n + r["relight_seconds"] for n in (1, 5, 20)}
-        elif r["method"] in (STAGE, STAGE_DENOISED, MATTE, RAW, NO_LAMPS, "whole"):
+        elif r["method"] in (STAGE, STAGE_DENOISED, RAW, NO_LAMPS, "whole", "auto"):
             name = f"{r['method']}, 5 relights"
             curves = {(name, 5): once / 5 + r["relight_seconds"]}
         else:
@@ -177,7 +170,7 @@ def plot(path: Path, rows: Rows) -> None:
         axis.plot(x, y, style, marker="o", label=name)
     axis.set_xscale("log")
     axis.set_yscale("log")
-    axis.set_xlabel("seconds a picture, in plain renders of 128 samples")
+    axis.set_xlabel("seconds a picture, in denoised renders of as many samples as the capture")
     axis.set_ylabel("mean relative error (median over scenes and worlds)")
     axis.grid(True, which="both", alpha=0.3)
     axis.legend(fontsize=8)
@@ -204,7 +197,7 @@ def sheet(
     own = pick(rows, ARTO, samples)
     for line, (scene_name, world) in zip(axes, cases, strict=True):
         shot = Shot(scene_name, size, samples, lamp_samples)
-        measured = Times(**times[scene_name])
+        measured = Times.from_json(times[scene_name])
         row = own[scene_name, world.label]
         once = row["capture_seconds"] + row["fit_seconds"]
         budget = once / relights + row["relight_seconds"]

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+import arto
 import bpy
 import numpy as np
 from arto.arto_addon import capture, paths, work
@@ -26,6 +27,11 @@ from .machine import write_rows
 from .worlds import World
 
 OUT = Path("out/models")
+PACKAGE = Path(arto.__file__).parent
+# The code that decides what a capture set holds.
+DECIDES = [f"arto_addon/{n}" for n in ("capture", "hemicube_planes", "properties", "probe")]
+DECIDES += ["arto_addon/bounds", "arto_addon/stage"]
+DECIDES += ["core/refine", "core/hemicube", "core/patterns"]
 STAGE = "whole 16x16"
 MATTE = "matte"
 AUTO_RGB = "auto per channel"
@@ -35,8 +41,7 @@ def captured(
     scene_name: str, size: tuple[int, int], samples: int, seed: int = 0, **settings: Any
 ) -> CaptureSet:
     """The capture set of a scene under these settings, kept by content."""
-    made = Path(capture.__file__).parent
-    code = [(made / f"{n}.py").read_text() for n in ("capture", "hemicube_planes", "properties")]
+    code = [(PACKAGE / f"{name}.py").read_text() for name in DECIDES]
     key = reference.content_key(
         scene=scene_name, size=size, samples=samples, seed=seed, settings=settings, code=code
     )

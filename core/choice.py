@@ -119,10 +119,16 @@ def _window_sum(image: NDArray) -> NDArray:
     return image
 
 
-def check(choice: str, patterns: PatternSet) -> None:
-    """Raise a typed error if `choice` is unknown or the patterns cannot identify it."""
+def check(choice: str, patterns: PatternSet, separate: bool = False) -> None:
+    """Raise a typed error if `choice` is unknown, has no supports for each channel where those are
+    asked for (`separate`), or cannot be identified from the patterns."""
     if choice not in CHOICES:
         raise FieldError(f"no support model '{choice}': choose one of {', '.join(CHOICES)}")
+    if separate and choice in (SEARCH, STAGE_AND_MATTE):
+        raise FieldError(
+            f"'{choice}' has one support for all channels: turn Per Channel off, or choose another "
+            "support model"
+        )
     if choice == SEARCH:
         patterns.require((ONE,), f"the support model '{choice}'")
     elif choice == "auto":
@@ -178,6 +184,7 @@ def _shown_box(moments: Moments, offs: list[NDArray], n: NDArray) -> NDArray[np.
 def choose(
     choice: str,
     basis: NDArray,
+    coefficient: NDArray,
     patterns: PatternSet,
     known: Evidence,
     k: int,
@@ -185,10 +192,11 @@ def choose(
 ) -> tuple[NDArray[np.uint8], dict[int, NDArray]]:
     """Model codes of n pixels for patch k, and for each code in use the parameters of its pixels.
 
-    basis: (P, n, 3), the patch's images; choice: `auto`, or one model for every pixel that gets
-    light from the patch; separate: supports of each channel's own.
+    basis: (P, n, 3), the patch's images; coefficient: (n, 3) of theirs, the very numbers that the
+    evidence is of (worked out again, they may differ in the last digit, and what is just bright
+    enough be lost); choice: `auto`, or one model for every pixel that gets light from the patch;
+    separate: supports of each channel's own.
     """
-    coefficient = patterns.coefficient(basis)
     codes = np.full(basis.shape[1], NOTHING, np.uint8)
     if choice == "auto":
         # most entries are too dark to keep: what they see of their patch is not asked for

@@ -57,12 +57,15 @@ def _check_complete(path: Path) -> int:
     """
     if not path.is_file():
         raise ExrError(f"there is no file {path}: it was moved or deleted; make it again")
-    if path.stat().st_size < 8:
-        raise ExrError(f"{path} is no EXR file (or an empty one): make it again")
-    with path.open("rb") as f, mmap.mmap(f.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        if data[:4] != b"\x76\x2f\x31\x01":
+    try:
+        if path.stat().st_size < 8:
             raise ExrError(f"{path} is no EXR file (or an empty one): make it again")
-        parts = _complete_parts(data)
+        with path.open("rb") as f, mmap.mmap(f.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            if data[:4] != b"\x76\x2f\x31\x01":
+                raise ExrError(f"{path} is no EXR file (or an empty one): make it again")
+            parts = _complete_parts(data)
+    except OSError as e:
+        raise ExrError(f"{path} cannot be read ({e}): look at its permissions and disk") from e
     if not parts:
         raise ExrError(f"{path} is truncated or damaged: make it again")
     return parts

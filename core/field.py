@@ -134,10 +134,15 @@ class FieldWriter:
         with _writing(self.folder):
             (self.partial / HEADER).write_text(json.dumps(self.head, indent=1))
             old = self.folder.with_name(self.folder.name + ".old")
-            shutil.rmtree(old, ignore_errors=True)
             if self.folder.exists():
+                shutil.rmtree(old, ignore_errors=True)
                 self.folder.rename(old)
-            self.partial.rename(self.folder)
+            try:
+                self.partial.rename(self.folder)
+            except OSError:
+                if old.exists():
+                    old.rename(self.folder)
+                raise
             shutil.rmtree(old, ignore_errors=True)
 
     def abandon(self) -> None:
@@ -221,6 +226,10 @@ class Tile:
     @cached_property
     def _scales(self) -> NDArray[np.float32]:
         return np.asarray(self._load("scales", (self.patches,)))
+
+    def open(self) -> None:
+        """Map all that `entries` needs. Raises FieldError."""
+        _ = self.codes, self._arrays, self._scales
 
     def entries(self, k: int) -> list[Entries]:
         """The entries of patch k, model by model."""

@@ -42,20 +42,22 @@ def fit_tile(
         brightest = channel_sum(coefficients).argmax(axis=0)
     for k in range(patches):
         if choice == choices.SEARCH:
-            codes, _ = choices.choose("whole", images[k], patterns, known, k)
+            codes, _ = choices.choose("whole", images[k], coefficients[k], patterns, known, k)
             boxes = search(images[k], patterns, data.region.height)
             parameters = {BOX.code: boxes[codes == WHOLE.code]}
             codes[codes == WHOLE.code] = BOX.code
         elif brightest is not None:
             # the straightforward combination: a Light Stage, and one matte where it is brightest
-            codes, _ = choices.choose("whole", images[k], patterns, known, k)
+            codes, _ = choices.choose("whole", images[k], coefficients[k], patterns, known, k)
             codes[(brightest == k) & (codes == WHOLE.code)] = BOX.code
             parameters = {
                 s.code: s.fit(Moments.from_basis(images[k][:, codes == s.code], patterns))
                 for s in (WHOLE, BOX)
             }
         else:
-            codes, parameters = choices.choose(choice, images[k], patterns, known, k, separate)
+            codes, parameters = choices.choose(
+                choice, images[k], coefficients[k], patterns, known, k, separate
+            )
         writer.add(codes, coefficients[k], parameters)
         yield (k + 1) / patches
     yield writer
@@ -74,7 +76,7 @@ def fit(
     another in `folder` only when it is complete: closing the generator early leaves what was
     there. Raises CaptureSetError, FieldError, PatternError.
     """
-    choices.check(choice, captured.patterns)
+    choices.check(choice, captured.patterns, separate)
     samples = captured.head.get("samples")
     begun = time.perf_counter()
     reading = 0.0

@@ -88,6 +88,15 @@ class _Costs:
         return cost - left + sure * deviation
 
 
+def check(hemicube: Hemicube) -> None:
+    """Raise HemicubeError for a hemicube that `refine` cannot start from."""
+    if hemicube.leaves or hemicube.half_sides or hemicube.patches not in LEAF_SIDES:
+        raise HemicubeError(
+            "only whole faces of 1, 2, 4, 8 or 16 patches a side can be refined: choose such a "
+            "number, or turn Adaptive Patches off"
+        )
+
+
 def refine(hemicube: Hemicube, probe: NDArray, samples: float, most: int) -> Hemicube:
     """A hemicube whose patches are where a scene needs them.
 
@@ -96,12 +105,8 @@ def refine(hemicube: Hemicube, probe: NDArray, samples: float, most: int) -> Hem
     noise is not taken for detail; most: as many patches at the most. Every direction keeps a patch:
     the field stays right for light that the probe did not see. Raises HemicubeError.
     """
+    check(hemicube)
     faces = len(hemicube.faces)
-    if hemicube.leaves or hemicube.half_sides or hemicube.patches not in LEAF_SIDES:
-        raise HemicubeError(
-            "only whole faces of 1, 2, 4, 8 or 16 patches a side can be refined: choose such a "
-            "number, or turn Adaptive Patches off"
-        )
     if probe.shape[0] != faces * FINEST**2:
         raise HemicubeError(f"a probe of {probe.shape[0]} patches, not {faces * FINEST**2}")
     light = channel_sum(probe).reshape(faces, FINEST, FINEST, -1)

@@ -34,7 +34,7 @@ def relight(field: Field, light: PatchLight, own: float = 1.0) -> NDArray[np.flo
 
 def _light(tile: Tile, light: PatchLight) -> NDArray[np.float32]:
     """The light of all patches on the pixels of a tile -> (n, 3)."""
-    tile.entries(0)  # opens the files, which may fail, once and here
+    tile.open()  # which may fail: here, and not in the threads
 
     def some(first: int) -> NDArray[np.float32]:
         # channel by channel: numpy is three times as fast at adding into a row as into columns

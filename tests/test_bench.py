@@ -4,35 +4,44 @@ from __future__ import annotations
 
 import pytest
 
-from bench.accuracy import Times, break_even
+from bench.seconds import (
+    ARTO,
+    RAW,
+    RENDER,
+    RENDER_DENOISED,
+    STAGE_DENOISED,
+    Times,
+    Work,
+    break_even,
+    price,
+)
 
 TIMES = Times(
-    capture=17.8,
-    fit=2.0,
-    relight=1.0,
+    own=Work(capture=17.8, fit=2.0, relight=0.6, denoised=1.0),
+    grid=Work(capture=30.0, fit=3.0, relight=0.4, denoised=0.8),
+    stage=Work(capture=20.0, fit=4.0, relight=1.5, denoised=1.9),
     lamps=0.5,
     lamps_a_sample=0.1,
     render=1.0,
     render_a_sample=0.1,
-    stage=20.0,
+    denoise=0.4,
 )
 # the denoised render's error falls with the square root of its samples
 RIVAL = {8: 0.2, 32: 0.1, 128: 0.05}
 
 
 def test_break_even_is_where_the_sums_meet() -> None:
-    once = TIMES.capture + TIMES.fit
-    assert once == pytest.approx(19.8)
+    once = TIMES.own.capture + TIMES.own.fit
     # as good as 64 samples: a render takes 7.4 s, a relight 1 s
     error = 0.1 / 2**0.5
-    n = break_even(TIMES, once, error, TIMES.relight_of(0), RIVAL)
+    n = break_even(TIMES, once, error, TIMES.own.denoised, RIVAL)
     assert n == 4
     assert once + n * 1.0 <= n * TIMES.render_of(64)
     assert once + (n - 1) * 1.0 > (n - 1) * TIMES.render_of(64)
 
 
 def test_a_relight_that_costs_more_than_the_render_never_pays() -> None:
-    assert break_even(TIMES, 19.8, 0.2, TIMES.relight_of(64), RIVAL) is None
+    assert break_even(TIMES, 19.8, 0.2, 1.5 + 6.4, RIVAL) is None
 
 
 def test_a_better_picture_than_any_render_counts_as_the_last() -> None:
@@ -43,6 +52,30 @@ def test_a_better_picture_than_any_render_counts_as_the_last() -> None:
     assert break_even(TIMES, 19.8, 0.1, 1.0, worse) == break_even(TIMES, 19.8, 0.1, 1.0, RIVAL)
 
 
-def test_lamps_are_paid_for_by_the_relights_that_have_them() -> None:
-    assert TIMES.relight_of(0) == 1.0
-    assert TIMES.relight_of(10) == pytest.approx(2.5)
+def test_every_method_is_priced_by_what_it_does() -> None:
+    """Its own capture, fit and relight, denoising where it denoises, lamps where it has them."""
+
+    def seconds(*method: object) -> list[float | None]:
+        return list(TIMES.cost(*method).values())  # type: ignore[arg-type]
+
+    assert seconds(ARTO, 128, 0) == [17.8, 2.0, 1.0]
+    assert seconds(ARTO, 128, 10) == [17.8, 2.0, pytest.approx(2.5)]
+    assert seconds(RAW, 128, 0) == [17.8, 2.0, 0.6]
+    assert seconds("linear", 128, 0) == [30.0, 3.0, 0.4]
+    assert seconds("search", 128, 0) == [30.0, None, 0.4]
+    assert seconds("matte", 128, 0) == [30.0, None, None]
+    assert seconds(STAGE_DENOISED, 128, 0) == [20.0, 4.0, 1.9]
+    assert seconds(RENDER_DENOISED, 32, 0) == [0, 0, pytest.approx(4.2)]
+    assert seconds(RENDER, 32, 0) == [0, 0, pytest.approx(3.8)]
+
+
+def test_rows_get_their_seconds_and_their_break_even() -> None:
+    case = {"scene": "a", "hdri": "b", "lamp_samples": 0}
+    rows = [
+        {**case, "method": RENDER_DENOISED, "samples": n, "mean_relative_error": e}
+        for n, e in RIVAL.items()
+    ]
+    rows.append({**case, "method": ARTO, "samples": 128, "mean_relative_error": 0.1 / 2**0.5})
+    price(rows, {"a": TIMES}, 128)
+    assert rows[-1]["break_even"] == 4 and "break_even" not in rows[0]
+    assert {r["plain_render_seconds"] for r in rows} == {TIMES.render_of(128)}

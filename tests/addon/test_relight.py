@@ -130,9 +130,10 @@ def test_image_file_and_compositor(tmp_path):
     nodes = [n for n in tree.nodes if n.bl_idname == "CompositorNodeGroup"]
     assert [n.node_tree.name for n in nodes] == ["ARTO Relit"]
     # again: the same image, the same node
+    count = len(tree.nodes)
     set_colour(scene, (0.9, 0.1, 0.1))
     bpy.ops.arto.relight()
-    assert len(tree.nodes) == len(scene.compositing_node_group.nodes)
+    assert scene.compositing_node_group == tree and len(tree.nodes) == count
     assert len([i for i in bpy.data.images if i.name.startswith("ARTO")]) == 1
     again = np.array(bpy.data.images["ARTO Relit"].pixels[:]).reshape(*picture.shape)[::-1]
     np.testing.assert_allclose(again, exr.read(path)[""], atol=1e-6)
@@ -201,6 +202,19 @@ def test_order_of_work_and_other_shots(tmp_path):
         relit(scene)
     scene.camera.location.x -= 0.5
     bpy.context.view_layer.update()
+    lens = scene.camera.data
+    for name, value in (("lens", lens.lens + 5), ("shift_x", 0.1), ("type", "ORTHO")):
+        before = getattr(lens, name)
+        setattr(lens, name, value)
+        with pytest.raises(CaptureSetError, match="another lens"):
+            relit(scene)
+        setattr(lens, name, before)
+    tree = scene.world.node_tree
+    fog = tree.nodes.new("ShaderNodeVolumeScatter")
+    tree.links.new(fog.outputs[0], tree.get_output_node("CYCLES").inputs["Volume"])
+    with pytest.raises(SceneError, match="volume"):
+        relit(scene)
+    tree.nodes.remove(fog)
     scene.render.resolution_x += 2
     with pytest.raises(CaptureSetError, match="another width"):
         work.run(fit.fit(scene))

@@ -34,10 +34,26 @@ def test_lines_follow_the_files(tmp_path):
     head = paths.unfinished_capture_folder(scene) / "capture.json"
     head.write_text(head.read_text().replace('"done": true', '"done": false'))
     text, serves = status.capture_line(scene) or ("", False)
-    assert text.startswith("unfinished, 0 of 1 tiles") and serves
-    head.write_text("{")
-    os.utime(head, ns=(later, later))
-    assert status.capture_line(scene) is None
+    assert text == "unfinished, 0 of 1 tiles" and not serves
+    # damaged: the rest of the panel must be drawn
+    for text in ("{", "[]", "3", "null"):
+        head.write_text(text)
+        later += 10**9
+        os.utime(head, ns=(later, later))
+        assert status.capture_line(scene) is None
+    head.write_text('{"tiles": null}')
+    os.utime(head, ns=(0, 0))
+    assert status.capture_line(scene) == ("unfinished, 0 of 0 tiles", False)
+
+
+def test_what_another_version_left_is_said(tmp_path):
+    scene = small_scene(tmp_path)
+    there = captured(scene)
+    work.run(fit.fit(scene))
+    for path in (there.folder / "capture.json", paths.field_folder(scene) / "field.json"):
+        path.write_text(path.read_text().replace('"version": 1', '"version": 99'))
+    assert status.capture_line(scene) == ("of another version: capture again", False)
+    assert status.field_line(scene) == ("of another version: fit again", False)
 
 
 def test_a_file_that_was_never_saved(tmp_path):

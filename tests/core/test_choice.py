@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from arto.core.capture_set import CaptureSet
 from arto.core.choice import BROAD, CHOICES, DROPPED, Evidence, check, choose, evidence
 from arto.core.errors import FieldError, PatternError
+from arto.core.fit import fit_tile
+from arto.core.hemicube import Hemicube
 from arto.core.patterns import PatternSet, pattern_set
 from arto.core.supports import BOX, BY_CODE, LINEAR, NOTHING, SUPPORTS, WHOLE
 from hypothesis import given
@@ -26,8 +31,8 @@ def alone(
     samples: float | None = None,
 ) -> tuple[np.ndarray, dict[int, np.ndarray]]:
     """The choice where this patch is the only one. basis: (P, n, 3)."""
-    found = known(patterns.coefficient(basis)[None], samples)
-    return choose(choice, basis, patterns, found, 0)
+    coefficient = patterns.coefficient(basis)
+    return choose(choice, basis, coefficient, patterns, known(coefficient[None], samples), 0)
 
 
 def test_no_light_is_no_entry() -> None:
@@ -81,7 +86,7 @@ def test_hits_are_counted_by_the_share_of_the_light(planted) -> None:
         rest = np.full((1, 1, 3), 1 / share - 1)
         found = known(np.concatenate([np.ones((1, 1, 3)), rest]), 64)
         assert found.hits(0, np.ones((1, 3))) == pytest.approx(64 * share)
-        codes.append(choose("auto", basis, MOMENTS, found, 0)[0][0])
+        codes.append(choose("auto", basis, np.ones((1, 3)), MOMENTS, found, 0)[0][0])
     assert codes == [BOX.code, BOX.code, LINEAR.code]
 
 
@@ -112,12 +117,28 @@ def test_what_is_dropped_stays_under_its_share(planted, seed: int, patches: int)
     kept = np.empty((patches, 20), bool)
     for k, c in enumerate(r):
         basis = planted(MOMENTS, box, c).astype(np.float32)
-        kept[k] = choose("auto", basis, MOMENTS, everything, k)[0] != NOTHING
+        kept[k] = choose("auto", basis, c, MOMENTS, everything, k)[0] != NOTHING
     size = r.sum(axis=-1, dtype=np.float64)
     dropped = np.where(kept, 0, size).sum(axis=0)
     assert (dropped <= DROPPED * size.sum(axis=0)).all()
     smallest = np.where(kept, size, np.inf).min(axis=0)
     assert (dropped + smallest > DROPPED * size.sum(axis=0)).all()
+
+
+@pytest.mark.parametrize("patterns", ["paper", "linear", "moments_uv"])
+@pytest.mark.parametrize("shape", [(1, 1), (1, 5), (5, 8)])
+def test_what_is_dropped_of_a_tile_stays_under_its_share(
+    tmp_path: Path, scene, write_scene, patterns: str, shape: tuple[int, int]
+) -> None:
+    """Pixels that few patches light: there the least bright entry that must be kept is much."""
+    for seed in range(20):
+        made = scene(Hemicube(patches=2), shape, patterns, seed, unlit=0.9)
+        data = CaptureSet(write_scene(tmp_path / f"{seed}", made)).read(0)
+        *_, tile = fit_tile(data, made.patterns, "auto")
+        kept = np.stack(tile.codes) != NOTHING
+        size = made.coefficient.sum(axis=-1).reshape(kept.shape)
+        dropped = np.where(kept, 0, size).sum(axis=0)
+        assert (dropped <= 1.01 * DROPPED * size.sum(axis=0)).all()
 
 
 @pytest.mark.parametrize("name", list(SUPPORTS))
@@ -153,5 +174,7 @@ def test_a_choice_that_cannot_be() -> None:
     with pytest.raises(PatternError, match="'linear' needs the moments u, v"):
         check("linear", pattern_set("white"))
     check("whole", pattern_set("white"))
+    with pytest.raises(FieldError, match="'search' has one support for all channels"):
+        check("search", MOMENTS, separate=True)
     for choice in CHOICES:
         check(choice, pattern_set("moments_uv"))

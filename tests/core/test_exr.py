@@ -229,6 +229,17 @@ def test_a_folder_that_cannot_be_written(read_only: Path) -> None:
     refused(read_only / "deeper" / "a.exr", layers())
 
 
+def test_a_file_that_cannot_be_opened(tmp_path: Path, monkeypatch) -> None:
+    exr.write(tmp_path / "a.exr", layers())
+
+    def refuse(*_: object, **__: object) -> None:
+        raise PermissionError("not yours")
+
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(ExrError, match=r"a\.exr cannot be read \(not yours\)"):
+        exr.read(tmp_path / "a.exr")
+
+
 def test_a_file_in_the_place_of_the_folder(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("mine")
     refused(tmp_path / "file" / "a.exr", layers())

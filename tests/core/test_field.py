@@ -227,6 +227,25 @@ def test_what_a_crash_left_behind_does_no_harm(tmp_path: Path, capture: Path, fi
     assert {f.name for f in tmp_path.iterdir()} == {"capture", "field"}
 
 
+def test_a_field_that_cannot_take_its_place_leaves_the_old_one(
+    tmp_path: Path, capture: Path, fitted, monkeypatch
+) -> None:
+    fitted(capture, tmp_path / "field")
+    before = contents(tmp_path / "field")
+    rename: Callable = Path.rename
+
+    def failing(path: Path, to: Path) -> Path:
+        if path.name == "field.part":
+            raise PermissionError("in use")
+        return rename(path, to)
+
+    monkeypatch.setattr(Path, "rename", failing)
+    with pytest.raises(FieldError, match="in use"):
+        fitted(capture, tmp_path / "field", "whole")
+    assert contents(tmp_path / "field") == before
+    assert {f.name for f in tmp_path.iterdir()} == {"capture", "field"}
+
+
 def test_a_choice_that_the_patterns_cannot_tell_starts_nothing(
     tmp_path: Path, scene, write_scene
 ) -> None:
