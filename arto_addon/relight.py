@@ -32,8 +32,9 @@ LEAST_SAMPLES = 4
 def relight(scene: bpy.types.Scene) -> Steps:
     """Relight the scene's field with its world; returns (path of the EXR, seconds by part).
 
-    Raises SceneError, FieldError, ExrError; nothing of the scene changes but the image
-    `ARTO Relit` and its node in the compositor.
+    Raises SceneError, CaptureSetError (of another shot), FieldError, EnvironmentMapError, ExrError,
+    CancelledError; nothing of the scene changes but the image `ARTO Relit` and its node in the
+    compositor.
     """
     check_world(scene)
     settings = scene.arto
