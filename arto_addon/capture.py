@@ -149,7 +149,7 @@ def _lens(scene: bpy.types.Scene) -> list[Any]:
 def check_same_shot(scene: bpy.types.Scene, head: dict[str, Any], what: str) -> None:
     """Raise CaptureSetError where a capture set or field is of another shot than the scene's."""
     now = shot(scene)
-    then = head.get("shot", {})
+    then = head.get("shot") or {}
     for key in ("scene", "width", "height", "frame", "camera", "lens"):
         if key in then and then[key] != now[key]:
             shown = "" if key in ("camera", "lens") else f" ({then[key]}, now {now[key]})"

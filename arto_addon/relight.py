@@ -29,6 +29,11 @@ OPAQUE = 1 - 1e-5
 LEAST_SAMPLES = 4
 
 
+def lamp_samples(scene: bpy.types.Scene, share: float) -> int:
+    """Samples of the render of lamps that have this share of the light."""
+    return max(LEAST_SAMPLES, math.ceil(scene.arto.lamp_samples * share))
+
+
 def relight(scene: bpy.types.Scene) -> Steps:
     """Relight the scene's field with its world; returns (path of the EXR, seconds by part).
 
@@ -64,7 +69,7 @@ def relight(scene: bpy.types.Scene) -> Steps:
             lamps = "no: the field does not say of which view layer it is; capture again"
             yield Progress(0.3, f"the world's lamps: {lamps}")
         elif found.worth:
-            samples = max(LEAST_SAMPLES, math.ceil(settings.lamp_samples * found.share))
+            samples = lamp_samples(scene, found.share)
             lamps = f"{found.share:.0%} of the world's light, {samples} samples"
             yield Progress(0.2, f"the world's lamps: {lamps}")
             parts.append((yield from lamp_light(scene, field, found.lamps, samples, 0.3)))

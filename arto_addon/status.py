@@ -2,74 +2,73 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import bpy
 
 from ..core import capture_set, field
+from ..core.capture_set import CaptureSet
 from ..core.errors import ArtoError
+from ..core.field import Field
 from . import paths
 from .capture import check_same_shot
 
 # A panel is drawn with every move of the mouse; a description is read when it has changed.
-_read: dict[Path, tuple[int, dict[str, Any]]] = {}
+_read: dict[Path, tuple[int, CaptureSet | Field | None]] = {}
 
 
-def _description(path: Path) -> dict[str, Any]:
-    """A description on disk, empty where there is none that can be read."""
-    try:
-        changed = path.stat().st_mtime_ns
-        if path not in _read or _read[path][0] != changed:
-            found = json.loads(path.read_text())
-            _read[path] = (changed, found if isinstance(found, dict) else {})
-        return _read[path][1]
-    except (OSError, ValueError):
-        return {}
+def _opened(kind: type, path: Path, **options: Any) -> Any:
+    """What a description describes, None where it is damaged or of another version.
+
+    Raises OSError where it is not there.
+    """
+    changed = path.stat().st_mtime_ns
+    if path not in _read or _read[path][0] != changed:
+        try:
+            found = kind(path.parent, **options)
+        except ArtoError:
+            found = None
+        _read[path] = (changed, found)
+    return _read[path][1]
 
 
 def capture_line(scene: bpy.types.Scene) -> tuple[str, bool] | None:
     """What there is of a capture, and whether it serves the shot as it is; None for nothing."""
     try:
-        there = _description(paths.capture_folder(scene) / capture_set.HEADER)
-        begun = _description(paths.unfinished_capture_folder(scene) / capture_set.HEADER)
-    except ArtoError:
+        path = paths.capture_folder(scene) / capture_set.HEADER
+        if not path.is_file():
+            path = paths.unfinished_capture_folder(scene) / capture_set.HEADER
+        there: CaptureSet | None = _opened(CaptureSet, path, unfinished=True)
+    except (ArtoError, OSError):
         return None
-    if begun and not there:
-        tiles = begun.get("tiles") or []
-        done = sum(bool(t.get("done")) for t in tiles)
+    if there is None:
+        return "damaged, or of another version: capture again", False
+    tiles = there.head["tiles"]
+    done = sum(t["done"] for t in tiles)
+    if done < len(tiles):
         # whether Capture goes on with it hangs on every setting
         return f"unfinished, {done} of {len(tiles)} tiles", False
-    if not there:
-        return None
-    if there.get("version") != capture_set.VERSION:
-        return "of another version: capture again", False
-    text = f"{there.get('patches')} patches, {there.get('samples')} samples"
-    return _of_this_shot(scene, there, text)
+    text = f"{len(there.hemicube)} patches, {there.head.get('samples')} samples"
+    return _of_this_shot(scene, there.head, text)
 
 
 def field_line(scene: bpy.types.Scene) -> tuple[str, bool] | None:
     """What there is of a field, and whether it serves the shot as it is; None for nothing."""
     try:
         path = paths.field_folder(scene) / field.HEADER
-        there = _description(path)
+        there: Field | None = _opened(Field, path)
         captured = paths.capture_folder(scene) / capture_set.HEADER
-    except ArtoError:
+        # a field needs no capture set any more
+        older = captured.is_file() and path.stat().st_mtime_ns < captured.stat().st_mtime_ns
+    except (ArtoError, OSError):
         return None
-    if not there:
-        return None
-    try:
-        older = path.stat().st_mtime_ns < captured.stat().st_mtime_ns
-    except OSError:
-        older = False  # a field needs no capture set any more
+    if there is None:
+        return "damaged, or of another version: fit again", False
     if older:
         return "of an earlier capture: fit again", False
-    if there.get("version") != field.VERSION:
-        return "of another version: fit again", False
-    about = there.get("about") or {}
-    text = f"{there.get('patches')} patches, {about.get('choice')}"
-    return _of_this_shot(scene, about, text)
+    text = f"{len(there.hemicube)} patches, {there.about.get('choice')}"
+    return _of_this_shot(scene, there.about, text)
 
 
 def _of_this_shot(scene: bpy.types.Scene, head: dict[str, Any], text: str) -> tuple[str, bool]:

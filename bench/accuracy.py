@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
@@ -195,10 +194,7 @@ def world_rows(
     edges = shadow_edges(truth, shot.guides, seen)
     groups = {m: seen & (one.index == i) for m, i in scenes.MATERIALS[shot.name].items()}
     split = lamps.split(environment)
-    lamp_samples = 0
-    if split.worth:
-        wanted = shot.scene().arto.lamp_samples
-        lamp_samples = max(relight.LEAST_SAMPLES, math.ceil(wanted * split.share))
+    lamp_samples = relight.lamp_samples(shot.scene(), split.share) if split.worth else 0
     found = [(n, shot.samples, p) for n, p in shot.pictures(world, environment).items()]
     for samples in SAMPLES:
         raw, clean = rerendered(shot.name, world, shot.size, samples)

@@ -79,6 +79,24 @@ def _ratio(rows: Rows, samples: int, other: str, key: str = "relmse_trimmed") ->
     return {scene: median(v) for scene, v in found.items()}
 
 
+def _by_lamps(own: Rows, much: float = 0.8) -> list[str]:
+    """Break-even where lamps have much of the light, and where not: a line each."""
+    lines = []
+    for word, here in (
+        ("under", [r for r in own if r["lamp_share"] < much]),
+        ("at least", [r for r in own if r["lamp_share"] >= much]),
+    ):
+        counts = [r["break_even"] for r in here]
+        paid = [c for c in counts if c is not None]
+        if paid:
+            lines.append(
+                f"  - lamps have {word} {much:.0%} of the light ({len(here)} cases): median "
+                f"{median(np.inf if c is None else c for c in counts):g}, {min(paid)} to "
+                f"{max(paid)}, never in {len(counts) - len(paid)}"
+            )
+    return lines
+
+
 def summary(rows: Rows, samples: int) -> str:
     """Markdown: the figures that decide."""
     own = pick(rows, ARTO, samples)
@@ -91,12 +109,13 @@ def summary(rows: Rows, samples: int) -> str:
     paid = sorted(np.inf if c is None else c for c in counts)
     ratio = [r["capture_seconds"] / r["plain_render_seconds"] for r in own.values()]
     lines = [
-        f"- over the noise floor: median {median(over.values()):.3f}, worst {over[worst]:.3f} "
+        f"- over the noise floor: median {median(over.values()):z.3f}, worst {over[worst]:.3f} "
         f"({', '.join(worst)}), of {len(over)} cases",
         f"- over a denoised render of 128 samples: median {median(behind.values()):.3f}, worst "
         f"{behind[last]:.3f} ({', '.join(last)})",
         f"- break-even: median {median(paid):g} relights; never in "
         f"{sum(c is None for c in counts)} of {len(counts)}",
+        *_by_lamps(list(own.values())),
         f"- capture of {samples} samples: {min(ratio):.2f} to {max(ratio):.2f} times a plain "
         "render of as many, denoised",
     ]

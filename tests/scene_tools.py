@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -76,6 +78,16 @@ def set_colour(scene: bpy.types.Scene, colour: tuple[float, float, float], stren
     background = scene.world.node_tree.nodes["Background"]
     background.inputs["Color"].default_value = (*colour, 1)
     background.inputs["Strength"].default_value = strength
+
+
+@contextmanager
+def world_volume(scene: bpy.types.Scene) -> Iterator[None]:
+    """The scene's world filled with fog for a while."""
+    tree = scene.world.node_tree
+    fog = tree.nodes.new("ShaderNodeVolumeScatter")
+    tree.links.new(fog.outputs[0], tree.get_output_node("CYCLES").inputs["Volume"])
+    yield
+    tree.nodes.remove(fog)
 
 
 def captured(scene: bpy.types.Scene) -> CaptureSet:

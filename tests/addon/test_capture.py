@@ -13,7 +13,16 @@ from arto.arto_addon import capture, fit, paths, work
 from arto.core import exr
 from arto.core.capture_set import GROUP
 from arto.core.errors import ArtoError, CancelledError, CaptureSetError, SceneError
-from scene_tools import HEIGHT, WIDTH, captured, cycles, differences, small_scene, snapshot
+from scene_tools import (
+    HEIGHT,
+    WIDTH,
+    captured,
+    cycles,
+    differences,
+    small_scene,
+    snapshot,
+    world_volume,
+)
 
 
 @pytest.mark.parametrize("route", ["pattern", "single"])
@@ -241,12 +250,8 @@ def test_bad_scenes(scene):
     with pytest.raises(SceneError, match="Floor"):
         captured(scene)
     scene.objects["Floor"].is_shadow_catcher = False
-    tree = scene.world.node_tree
-    fog = tree.nodes.new("ShaderNodeVolumeScatter")
-    tree.links.new(fog.outputs[0], tree.get_output_node("CYCLES").inputs["Volume"])
-    with pytest.raises(SceneError, match="volume"):
+    with world_volume(scene), pytest.raises(SceneError, match="volume"):
         captured(scene)
-    tree.nodes.remove(fog)
     scene.render.resolution_percentage = 10
     with pytest.raises(SceneError, match="pixels: raise the resolution"):
         captured(scene)

@@ -25,6 +25,7 @@ from scene_tools import (
     set_colour,
     small_scene,
     snapshot,
+    world_volume,
 )
 from test_world import hdri, smooth
 
@@ -209,12 +210,8 @@ def test_order_of_work_and_other_shots(tmp_path):
         with pytest.raises(CaptureSetError, match="another lens"):
             relit(scene)
         setattr(lens, name, before)
-    tree = scene.world.node_tree
-    fog = tree.nodes.new("ShaderNodeVolumeScatter")
-    tree.links.new(fog.outputs[0], tree.get_output_node("CYCLES").inputs["Volume"])
-    with pytest.raises(SceneError, match="volume"):
+    with world_volume(scene), pytest.raises(SceneError, match="volume"):
         relit(scene)
-    tree.nodes.remove(fog)
     scene.render.resolution_x += 2
     with pytest.raises(CaptureSetError, match="another width"):
         work.run(fit.fit(scene))
