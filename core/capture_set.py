@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from . import exr
 from .errors import ArtoError, CaptureSetError, ExrError
-from .field import Region
 from .hemicube import Hemicube
 from .patterns import PatternSet, pattern_set
+from .region import Region
 
 VERSION = 1
 HEADER = "capture.json"

@@ -11,7 +11,8 @@ import numpy as np
 
 from . import choice as choices
 from .capture_set import CaptureSet, TileData
-from .field import FieldWriter, TileWriter
+from .evidence import evidence
+from .field_writer import FieldWriter, TileWriter
 from .moments import Moments, channel_sum
 from .patterns import PatternSet
 from .search import search
@@ -36,7 +37,7 @@ def fit_tile(
     images = data.basis.reshape(patches, len(patterns), -1, 3)
     coefficients = patterns.coefficient(np.moveaxis(images, 1, 0))
     shape = (data.region.height, data.region.width)
-    known = choices.evidence(coefficients, shape, samples, data.grain)
+    known = evidence(coefficients, shape, samples, data.grain)
     brightest = None
     if choice == choices.STAGE_AND_MATTE:
         brightest = channel_sum(coefficients).argmax(axis=0)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from arto.arto_addon import world
 from arto.core.errors import SceneError
-from arto.core.field import Region
+from arto.core.region import Region
 from scene_tools import set_colour
 
 

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 from arto.core import capture_set, exr, fit
 from arto.core.environment import Environment
-from arto.core.field import Field, Region
+from arto.core.field import Field
 from arto.core.hemicube import Hemicube
 from arto.core.patterns import PatternSet, pattern_set
+from arto.core.region import Region
 from hypothesis import settings
 from numpy.typing import NDArray
 

@@ -11,9 +11,9 @@ import pytest
 from arto.core import capture_set, exr
 from arto.core.capture_set import HEADER, CaptureSet
 from arto.core.errors import CaptureSetError
-from arto.core.field import Region
 from arto.core.hemicube import Hemicube
 from arto.core.patterns import PATTERN_SETS, pattern_set
+from arto.core.region import Region
 
 CUBE = Hemicube(faces=("top", "back"), patches=2, half_sides=True, centre=(1.0, 2.0, 3.0))
 FILE = "tile_0000.exr"

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from arto.core.capture_set import CaptureSet
-from arto.core.choice import BROAD, CHOICES, DROPPED, Evidence, check, choose, evidence
+from arto.core.choice import BROAD, CHOICES, check, choose
 from arto.core.errors import FieldError, PatternError
+from arto.core.evidence import DROPPED, Evidence, evidence
 from arto.core.fit import fit_tile
 from arto.core.hemicube import Hemicube
 from arto.core.patterns import PatternSet, pattern_set

@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 from arto.core import fit
 from arto.core.capture_set import CaptureSet
-from arto.core.choice import DROPPED
 from arto.core.errors import CaptureSetError, FieldError, PatternError
-from arto.core.field import HEADER, VERSION, Field, FieldWriter, Region, TileWriter
+from arto.core.evidence import DROPPED
+from arto.core.field import HEADER, VERSION, Field
+from arto.core.field_writer import FieldWriter, TileWriter
 from arto.core.hemicube import Hemicube
+from arto.core.region import Region
 from arto.core.relight import relight
 from arto.core.supports import BOX, LINEAR, NOTHING, WHOLE
 

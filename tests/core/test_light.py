@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from arto.core.bins import bin_coordinate, default_resolution
 from arto.core.environment import Environment
 from arto.core.hemicube import FACE_NAMES, Hemicube
-from arto.core.light import PatchLight, bin_coordinate, default_resolution
+from arto.core.light import PatchLight
 from arto.core.patterns import ONE, UU, UV, VV, U, V, monomials
 from arto.core.supports import BOX, LINEAR, WHOLE
 from hypothesis import example, given, settings
@@ -366,7 +367,7 @@ def test_a_map_of_another_size_or_cube_is_not_mistaken(noisy, monkeypatch) -> No
     for cube in cubes:
         for e in maps:
             for binned, r in zip(next(again), (4, 8), strict=True):
-                monkeypatch.setattr("arto.core.light._CACHE", {})
+                monkeypatch.setattr("arto.core.bins._CACHE", {})
                 np.testing.assert_array_equal(binned, PatchLight(e, cube, r).binned)
 
 

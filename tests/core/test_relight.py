@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arto.core.choice import BROAD, CENTRED, DROPPED
+from arto.core.choice import BROAD, CENTRED
 from arto.core.environment import Environment
-from arto.core.field import Field, Region
+from arto.core.evidence import DROPPED
+from arto.core.field import Field
 from arto.core.hemicube import Hemicube
 from arto.core.light import PatchLight
 from arto.core.patterns import ONE, U, V
+from arto.core.region import Region
 from arto.core.relight import over, relight
 from arto.core.supports import BOX, LINEAR, NOTHING, WHOLE
 

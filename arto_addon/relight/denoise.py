@@ -14,8 +14,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import exr
-from ..core.field import Field
+from ...core import exr
+from ...core.field import Field
 from .stage import float_exr
 from .work import Render, blocking_render
 

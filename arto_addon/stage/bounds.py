@@ -11,7 +11,7 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
 
-from ..core.errors import SceneError
+from ...core.errors import SceneError
 from .stage import Stage
 
 _found: list[tuple[NDArray, NDArray]] = []

@@ -9,11 +9,12 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.field import Field, Region
-from ..core.lamps import split
-from ..core.light import PatchLight
-from ..core.relight import over
-from ..core.relight import relight as relight_field
+from ...core.field import Field
+from ...core.region import Region
+from ...core.lamps import split
+from ...core.light import PatchLight
+from ...core.relight import over
+from ...core.relight import relight as relight_field
 from . import denoise, paths, plate
 from .capture import check_same_shot
 from .lamps import lamp_light

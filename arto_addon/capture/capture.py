@@ -14,8 +14,8 @@ from typing import Any
 
 import bpy
 
-from ..core import exr
-from ..core.capture_set import (
+from ...core import exr
+from ...core.capture_set import (
     GRAIN,
     GROUP,
     HEADER,
@@ -25,10 +25,10 @@ from ..core.capture_set import (
     group_name,
     write_header,
 )
-from ..core.errors import ArtoError, CaptureSetError, SceneError
-from ..core.field import Region
-from ..core.hemicube import Hemicube
-from ..core.patterns import PatternSet, pattern_set
+from ...core.errors import ArtoError, CaptureSetError, SceneError
+from ...core.region import Region
+from ...core.hemicube import Hemicube
+from ...core.patterns import PatternSet, pattern_set
 from . import hemicube_planes, paths
 from .bounds import scene_bounds
 from .probe import refined

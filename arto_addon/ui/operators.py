@@ -6,7 +6,7 @@ import time
 
 import bpy
 
-from ..core.errors import ArtoError, CancelledError
+from ...core.errors import ArtoError, CancelledError
 from . import capture, fit, hemicube_planes, paths, relight
 from .bounds import scene_bounds
 from .stage import stage

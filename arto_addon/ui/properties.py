@@ -14,9 +14,9 @@ from bpy.props import (
     StringProperty,
 )
 
-from ..core.choice import CHOICES
-from ..core.hemicube import FACE_NAMES, PRESETS
-from ..core.patterns import PATTERN_SETS
+from ...core.choice import CHOICES
+from ...core.hemicube import FACE_NAMES, PRESETS
+from ...core.patterns import PATTERN_SETS
 
 _PATTERN_TEXT = {
     "moments": ("1, u, u², v, v²", "Five patterns that identify a box"),

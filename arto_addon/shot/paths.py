@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 
-from ..core.errors import SceneError
+from ...core.errors import SceneError
 
 
 def absolute(path: str) -> Path:

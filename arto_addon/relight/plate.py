@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import exr
+from ...core import exr
 
 IMAGE = "ARTO Relit"
 GROUP = "ARTO Relit"

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core import exr
-from ..core.capture_set import GROUP
-from ..core.errors import CaptureSetError
-from ..core.hemicube import FINEST, Hemicube
-from ..core.patterns import pattern_set
-from ..core.refine import check, refine
+from ...core import exr
+from ...core.capture_set import GROUP
+from ...core.errors import CaptureSetError
+from ...core.hemicube import FINEST, Hemicube
+from ...core.patterns import pattern_set
+from ...core.refine import check, refine
 from . import hemicube_planes
 from .stage import Stage
 from .work import Render, Steps

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..core.hemicube import SIDES
+from ...core.hemicube import SIDES
 from . import hemicube_planes, status
 
 

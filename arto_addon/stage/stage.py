@@ -13,8 +13,8 @@ from typing import Any
 
 import bpy
 
-from ..core.errors import SceneError
-from ..core.field import Region
+from ...core.errors import SceneError
+from ...core.region import Region
 
 # What carries light out of a render besides Combined and is of no use here.
 _KEEP_PASSES = {"use_pass_combined", "use_pass_z"}

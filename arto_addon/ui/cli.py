@@ -9,10 +9,10 @@ from typing import Any
 
 import bpy
 
-from ..core.choice import CHOICES
-from ..core.errors import ArtoError, CancelledError
-from ..core.hemicube import FACE_NAMES, PRESETS
-from ..core.patterns import PATTERN_SETS
+from ...core.choice import CHOICES
+from ...core.errors import ArtoError, CancelledError
+from ...core.hemicube import FACE_NAMES, PRESETS
+from ...core.patterns import PATTERN_SETS
 from . import capture, fit, relight
 from .work import ProgressLines, run
 

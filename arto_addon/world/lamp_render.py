@@ -14,10 +14,11 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import exr
-from ..core.environment import Environment
-from ..core.errors import SceneError
-from ..core.field import Field, Region
+from ...core import exr
+from ...core.environment import Environment
+from ...core.errors import SceneError
+from ...core.field import Field
+from ...core.region import Region
 from .capture import prepare
 from .stage import Stage, set_region, stage
 from .work import Render, Steps

@@ -7,10 +7,10 @@ from typing import Any
 
 import bpy
 
-from ..core import capture_set, field
-from ..core.capture_set import CaptureSet
-from ..core.errors import ArtoError
-from ..core.field import Field
+from ...core import capture_set, field
+from ...core.capture_set import CaptureSet
+from ...core.errors import ArtoError
+from ...core.field import Field
 from . import paths
 from .capture import check_same_shot
 

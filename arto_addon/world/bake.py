@@ -18,10 +18,10 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import exr
-from ..core.environment import Environment
-from ..core.errors import SceneError
-from ..core.field import Region
+from ...core import exr
+from ...core.environment import Environment
+from ...core.errors import SceneError
+from ...core.region import Region
 from .stage import float_exr, picture_size, set_region
 from .work import Render, blocking_render
 

@@ -11,9 +11,9 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..core.capture_set import GRAIN, group_name
-from ..core.hemicube import FACE_NAMES, Hemicube
-from ..core.patterns import PatternSet, pattern_set
+from ...core.capture_set import GRAIN, group_name
+from ...core.hemicube import FACE_NAMES, Hemicube
+from ...core.patterns import PatternSet, pattern_set
 from .stage import Stage
 
 COLLECTION = "ARTO Hemicube"

@@ -1,0 +1,122 @@
+"""Writing a reflectance field, tile by tile; it is there only when it is complete."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import FieldError
+from .field import HEADER, VERSION
+from .hemicube import Hemicube
+from .region import Region
+from .supports import BY_CODE
+
+
+class TileWriter:
+    """Collects one tile's entries, patch after patch, and writes them at the end."""
+
+    def __init__(self, region: Region, layers: dict[str, NDArray]) -> None:
+        self.region = region
+        self.layers = layers
+        self.codes: list[NDArray] = []
+        self.scales: list[float] = []
+        self.parts: dict[int, tuple[list[NDArray], list[NDArray]]] = {}
+
+    def add(self, codes: NDArray, coefficient: NDArray, parameters: dict[int, NDArray]) -> None:
+        """The next patch: model code (n,), R (n, 3), and each used code's parameters (m, p)."""
+        # half floats are relative to the patch's brightest, so that any exposure fits them
+        scale = float(coefficient.max(initial=0)) or 1.0
+        self.codes.append(codes)
+        self.scales.append(scale)
+        for code, values in parameters.items():
+            r, p = self.parts.setdefault(code, ([], []))
+            r.append((coefficient[codes == code] / scale).astype(np.float16))
+            p.append(np.rint(np.clip(values, 0, 1) * 65535).astype(np.uint16))
+
+    def write(self, folder: Path) -> dict[str, int]:
+        """Write the arrays; returns how many entries each model took."""
+        folder.mkdir(parents=True)
+        codes = np.stack(self.codes)
+        np.save(folder / "codes.npy", codes)
+        np.save(folder / "scales.npy", np.array(self.scales, np.float32))
+        used = {}
+        for code, (r, p) in sorted(self.parts.items()):
+            name = BY_CODE[code].name
+            np.save(folder / f"{name}_coefficient.npy", np.concatenate(r))
+            np.save(folder / f"{name}_parameters.npy", np.concatenate(p))
+            used[name] = sum(map(len, r))
+        for name, pixels in self.layers.items():
+            dtype = np.float32 if name in ("own", "depth") else np.float16
+            np.save(folder / f"{name}.npy", pixels.astype(dtype))
+        return used
+
+
+class FieldWriter:
+    """Writes a field tile by tile. It is there only once `close` has returned."""
+
+    def __init__(self, folder: Path, hemicube: Hemicube, shape: tuple[int, int], **about: Any):
+        self.folder = folder
+        self.partial = folder.with_name(folder.name + ".part")
+        self.head: dict[str, Any] = {
+            "format": "ARTO reflectance field",
+            "version": VERSION,
+            "height": shape[0],
+            "width": shape[1],
+            "hemicube": hemicube.to_json(),
+            "patches": len(hemicube),
+            "about": about,
+            "tiles": [],
+        }
+        with _writing(folder):
+            shutil.rmtree(self.partial, ignore_errors=True)
+            self.partial.mkdir(parents=True)
+
+    def add(self, tile: TileWriter) -> None:
+        name = f"tile_{len(self.head['tiles']):04d}"
+        r = tile.region
+        with _writing(self.folder):
+            used = tile.write(self.partial / name)
+        self.head["tiles"].append(
+            {"folder": name, "region": [r.x, r.y, r.width, r.height], "entries": used}
+        )
+
+    def close(self) -> None:
+        with _writing(self.folder):
+            (self.partial / HEADER).write_text(json.dumps(self.head, indent=1))
+            old = self.folder.with_name(self.folder.name + ".old")
+            if self.folder.exists():
+                shutil.rmtree(old, ignore_errors=True)
+                self.folder.rename(old)
+            try:
+                self.partial.rename(self.folder)
+            except OSError:
+                if old.exists():
+                    old.rename(self.folder)
+                raise
+            shutil.rmtree(old, ignore_errors=True)
+
+    def abandon(self) -> None:
+        """Remove what was written; a field that was there before stays."""
+        shutil.rmtree(self.partial, ignore_errors=True)
+
+
+class _writing:
+    """Turns a failing write into a FieldError that says what to do."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, OSError):
+            raise FieldError(
+                f"the field {self.folder} cannot be written ({error}): make room on the disk, "
+                "or choose a folder that can be written"
+            ) from error
