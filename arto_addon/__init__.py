@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from . import cli, operators, panel, properties
+from .ui import cli, operators, panels, properties
 
-_CLASSES = (*properties.CLASSES, *operators.CLASSES, *panel.CLASSES)
+_CLASSES = (*properties.CLASSES, *operators.CLASSES, *panels.CLASSES)
 
 
 def register() -> None:

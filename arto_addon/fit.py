@@ -6,8 +6,8 @@ import bpy
 
 from ..core.capture_set import HEADER, CaptureSet
 from ..core.fit import fit as fit_captured
-from . import paths
-from .capture import check_same_shot
+from .shot import paths
+from .shot.shot import check_same_shot
 from .work import Progress, Steps
 
 

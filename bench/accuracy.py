@@ -17,8 +17,10 @@ from typing import Any
 import arto
 import bpy
 import numpy as np
-from arto.arto_addon import denoise, fit, paths, relight, work
-from arto.arto_addon.world import bake
+from arto.arto_addon import fit, work
+from arto.arto_addon.relight import denoise, relight
+from arto.arto_addon.shot import paths
+from arto.arto_addon.world.bake import bake
 from arto.core import exr, lamps, matte, metrics
 from arto.core.choice import CHOICES
 from arto.core.environment import Environment

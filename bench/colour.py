@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from arto.arto_addon.world import bake
+from arto.arto_addon.world.bake import bake
 from arto.core import metrics
 from arto.core.light import PatchLight
 from arto.core.relight import relight

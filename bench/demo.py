@@ -10,7 +10,7 @@ from typing import Any
 
 import bpy
 import numpy as np
-from arto.arto_addon import paths
+from arto.arto_addon.shot import paths
 from arto.core import exr, metrics
 from arto.core.capture_set import CaptureSet
 from arto.core.field import Field

@@ -11,8 +11,10 @@ from typing import Any
 import arto
 import bpy
 import numpy as np
-from arto.arto_addon import capture, paths, work
-from arto.arto_addon.world import bake
+from arto.arto_addon import work
+from arto.arto_addon.capture import capture
+from arto.arto_addon.shot import paths
+from arto.arto_addon.world.bake import bake
 from arto.core import matte, metrics
 from arto.core.capture_set import CaptureSet
 from arto.core.choice import CHOICES

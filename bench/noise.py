@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from arto.arto_addon import denoise
-from arto.arto_addon.world import bake
+from arto.arto_addon.relight import denoise
+from arto.arto_addon.world.bake import bake
 from arto.core import lamps, metrics
 from arto.core.light import PatchLight
 from arto.core.patterns import ONE, U, V

@@ -17,7 +17,7 @@ from typing import Any
 
 import bpy
 import numpy as np
-from arto.arto_addon.stage import float_exr
+from arto.arto_addon.blender.output import float_exr
 from arto.core import exr
 from numpy.typing import NDArray
 

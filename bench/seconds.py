@@ -15,8 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from arto.arto_addon import capture, fit, relight, work
-from arto.arto_addon.world import bake
+from arto.arto_addon import fit, work
+from arto.arto_addon.capture import capture
+from arto.arto_addon.relight import relight
+from arto.arto_addon.world.bake import bake
 from arto.core import lamps
 from arto.core.choice import SEARCH
 

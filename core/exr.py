@@ -2,7 +2,7 @@
 
 Blender carries an OpenEXR of its own whose symbols the wheel's library would otherwise find first:
 compressed reads then report errors for good pixels. The extension's wheels are changed so that
-they find their own first (bench/wheel_symbols.py). RTLD_DEEPBIND is no way: it also passes by the
+they find their own first (tools/wheel_symbols.py). RTLD_DEEPBIND is no way: it also passes by the
 allocator that Blender puts in malloc's place, and Blender aborts.
 """
 

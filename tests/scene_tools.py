@@ -10,8 +10,8 @@ from typing import Any
 
 import bpy
 import numpy as np
-from arto.arto_addon import capture as capture_module
 from arto.arto_addon import work
+from arto.arto_addon.capture import capture as capture_module
 from arto.core.capture_set import CaptureSet
 
 WIDTH, HEIGHT = 24, 18
@@ -97,7 +97,8 @@ def captured(scene: bpy.types.Scene) -> CaptureSet:
 
 def cycles(scene: bpy.types.Scene, samples: int, seed: int, folder: Path) -> np.ndarray:
     """What Cycles renders of the scene itself -> (H, W, 4), top-down."""
-    from arto.arto_addon.stage import float_exr, stage
+    from arto.arto_addon.blender.output import float_exr
+    from arto.arto_addon.stage.stage import stage
     from arto.core import exr
 
     with stage(scene, scene.view_layers[0].name) as on:

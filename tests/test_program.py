@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 from arto.core import exr
 
-from bench import package
+from tools import package
 
 pytestmark = pytest.mark.skipif(
     not os.environ.get("BLENDER"),

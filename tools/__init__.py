@@ -1,1 +1,1 @@
-"""What makes the extension and its pictures: `python -m tools.package`, `python -m tools.screenshot`."""
+"""What makes the extension and its pictures: `tools.package` and `tools.screenshot`."""

@@ -1,7 +1,7 @@
-"""Build the extension: `python -m bench.package` writes dist/arto-<version>.zip.
+"""Build the extension: `python -m tools.package` writes dist/arto-<version>.zip.
 
-    python -m bench.package           for every platform that the wheels of OpenEXR are taken for
-    python -m bench.package --here    for this machine's platform only; quicker, for tests
+    python -m tools.package           for every platform that the wheels of OpenEXR are taken for
+    python -m tools.package --here    for this machine's platform only; quicker, for tests
 
 The wheels are downloaded into wheels/ once. What ships is copied into build/extension/, the
 manifest there is told of platforms and wheels, and Blender's own tool, which comes with the module
@@ -142,7 +142,7 @@ def _run(command: list[str]) -> None:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="python -m bench.package", description="Build the zip.")
+    parser = argparse.ArgumentParser(prog="python -m tools.package", description="Build the zip.")
     parser.add_argument("--here", action="store_true", help="for this machine's platform only")
     try:
         print(build(parser.parse_args().here).relative_to(ROOT))

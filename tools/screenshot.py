@@ -1,4 +1,4 @@
-"""Picture of the extension in Blender's window: `python -m bench.screenshot docs/panel.png`.
+"""Picture of the extension in Blender's window: `python -m tools.screenshot docs/panel.png`.
 
 Builds the extension, installs it into a Blender of no person's own, captures, fits and relights the
 product shot at few samples, and shows panel, relit picture and compositor. Needs Linux, xvfb-run,
@@ -146,7 +146,7 @@ bpy.app.timers.register(step, first_interval=1.0)
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="python -m bench.screenshot")
+    parser = argparse.ArgumentParser(prog="python -m tools.screenshot")
     parser.add_argument("picture", type=Path, help="the PNG to write")
     picture = parser.parse_args().picture.resolve()
     blender = shlex.split(os.environ.get("BLENDER", ""))

@@ -14,7 +14,8 @@ import numpy as np
 from ...core.capture_set import GRAIN, group_name
 from ...core.hemicube import FACE_NAMES, Hemicube
 from ...core.patterns import PatternSet, pattern_set
-from .stage import Stage
+from ..blender.nodes import Nodes
+from ..stage.stage import Stage
 
 COLLECTION = "ARTO Hemicube"
 FAR = 1000.0
@@ -46,59 +47,39 @@ def wanted(scene: bpy.types.Scene, centre: Iterable[float], radius: float) -> He
 GRAINS = 2.0**14
 
 
-class _Nodes:
-    """A few calls that make building a node tree read like the formula it is."""
+def _polynomial(nodes: Nodes, coefficients: Iterable[float]) -> Any:
+    """The value of a polynomial over `patterns.MONOMIALS` of the UV map."""
+    split = nodes.add("ShaderNodeSeparateXYZ", nodes.add("ShaderNodeUVMap").outputs[0])
+    u, v = split.outputs[0], split.outputs[1]
+    terms = (
+        1.0,
+        u,
+        nodes.math("MULTIPLY", u, u),
+        v,
+        nodes.math("MULTIPLY", v, v),
+        nodes.math("MULTIPLY", u, v),
+    )
+    total: Any = 0.0
+    for coefficient, term in zip(coefficients, terms, strict=True):
+        if coefficient:
+            total = nodes.math("MULTIPLY_ADD", term, float(coefficient), total)
+    # on a patch's rim u and v may be a last digit below 0, and no light is negative
+    return nodes.math("MAXIMUM", total, 0.0)
 
-    def __init__(self, tree: Any) -> None:
-        self.tree = tree
 
-    def add(self, kind: str, *inputs: Any, operation: str = "") -> Any:
-        """A node with its inputs linked (sockets) or set (values)."""
-        node = self.tree.nodes.new(kind)
-        if operation:
-            node.operation = operation
-        for socket, value in zip(node.inputs, inputs, strict=False):
-            if isinstance(value, bpy.types.NodeSocket):
-                self.tree.links.new(value, socket)
-            else:
-                socket.default_value = value
-        return node
-
-    def math(self, operation: str, *inputs: Any) -> Any:
-        return self.add("ShaderNodeMath", *inputs, operation=operation).outputs[0]
-
-    def polynomial(self, coefficients: Iterable[float]) -> Any:
-        """The value of a polynomial over `patterns.MONOMIALS` of the UV map."""
-        split = self.add("ShaderNodeSeparateXYZ", self.add("ShaderNodeUVMap").outputs[0])
-        u, v = split.outputs[0], split.outputs[1]
-        terms = (
-            1.0,
-            u,
-            self.math("MULTIPLY", u, u),
-            v,
-            self.math("MULTIPLY", v, v),
-            self.math("MULTIPLY", u, v),
-        )
-        total: Any = 0.0
-        for coefficient, term in zip(coefficients, terms, strict=True):
-            if coefficient:
-                total = self.math("MULTIPLY_ADD", term, float(coefficient), total)
-        # on a patch's rim u and v may be a last digit below 0, and no light is negative
-        return self.math("MAXIMUM", total, 0.0)
-
-    def grain(self) -> Any:
-        """1 on half of the grains, 0 on the others, without order."""
-        scaled = self.add(
-            "ShaderNodeVectorMath",
-            self.add("ShaderNodeUVMap").outputs[0],
-            (GRAINS,) * 3,
-            operation="MULTIPLY",
-        )
-        cell = self.add("ShaderNodeVectorMath", scaled.outputs[0], operation="FLOOR")
-        noise = self.tree.nodes.new("ShaderNodeTexWhiteNoise")
-        noise.noise_dimensions = "3D"
-        self.tree.links.new(cell.outputs[0], noise.inputs["Vector"])
-        return self.math("GREATER_THAN", noise.outputs["Value"], 0.5)
+def _grain(nodes: Nodes) -> Any:
+    """1 on half of the grains, 0 on the others, without order."""
+    scaled = nodes.add(
+        "ShaderNodeVectorMath",
+        nodes.add("ShaderNodeUVMap").outputs[0],
+        (GRAINS,) * 3,
+        operation="MULTIPLY",
+    )
+    cell = nodes.add("ShaderNodeVectorMath", scaled.outputs[0], operation="FLOOR")
+    noise = nodes.tree.nodes.new("ShaderNodeTexWhiteNoise")
+    noise.noise_dimensions = "3D"
+    nodes.tree.links.new(cell.outputs[0], noise.inputs["Vector"])
+    return nodes.math("GREATER_THAN", noise.outputs["Value"], 0.5)
 
 
 def pattern_material(name: str, patterns: PatternSet, opaque: bool) -> Any:
@@ -109,12 +90,12 @@ def pattern_material(name: str, patterns: PatternSet, opaque: bool) -> Any:
     material.cycles.emission_sampling = "NONE"
     tree = material.node_tree
     tree.nodes.clear()
-    nodes = _Nodes(tree)
+    nodes = Nodes(tree)
     if name == GRAIN:
-        radiance = nodes.grain()
+        radiance = _grain(nodes)
     else:
         row = patterns.coefficients[patterns.patterns.index(name)]
-        radiance = nodes.polynomial(row)
+        radiance = _polynomial(nodes, row)
     shader = nodes.add("ShaderNodeEmission", (1, 1, 1, 1), radiance).outputs[0]
     if not opaque:
         behind = nodes.add("ShaderNodeBsdfTransparent").outputs[0]

@@ -15,9 +15,9 @@ from ...core.errors import CaptureSetError
 from ...core.hemicube import FINEST, Hemicube
 from ...core.patterns import pattern_set
 from ...core.refine import check, refine
-from . import hemicube_planes
-from .stage import Stage
-from .work import Render, Steps
+from ..stage.stage import Stage
+from ..work import Render, Steps
+from . import planes
 
 # Pixels and samples of the probe: its cost is the same for a picture of any size.
 PIXELS = 1728
@@ -52,7 +52,7 @@ def refined(on: Stage, hemicube: Hemicube, most: int) -> Steps:
             cycles.samples = SAMPLES
             path = Path(folder) / "probe.exr"
             render.filepath = str(path)
-            with hemicube_planes.lit(on, fine, patterns, images):
+            with planes.lit(on, fine, patterns, images):
                 request = Render(scene.name, 0, f"probing {len(fine)} directions")
                 yield request
                 request.check()

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from ...core import exr
 from ...core.field import Field
-from .stage import float_exr
-from .work import Render, blocking_render
+from ..blender.output import float_exr
+from ..work import Render, blocking_render
 
 _available: list[bool] = []
 

@@ -10,16 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.field import Field
-from ...core.region import Region
 from ...core.lamps import split
 from ...core.light import PatchLight
+from ...core.region import Region
 from ...core.relight import over
 from ...core.relight import relight as relight_field
-from . import denoise, paths, plate
-from .capture import check_same_shot
-from .lamps import lamp_light
-from .work import Progress, Steps
-from .world import background, bake, check_world
+from ..shot import paths
+from ..shot.shot import check_same_shot
+from ..work import Progress, Steps
+from ..world.background import background
+from ..world.bake import bake
+from ..world.check import check_world
+from ..world.lamp_render import lamp_light
+from . import denoise, plate
 
 # From this share of the light on the lamps are the picture, and what the field adds is denoised
 # with them: by themselves, beside darkness, they come out of the denoiser worse (docs/accuracy.md).

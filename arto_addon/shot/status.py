@@ -12,7 +12,7 @@ from ...core.capture_set import CaptureSet
 from ...core.errors import ArtoError
 from ...core.field import Field
 from . import paths
-from .capture import check_same_shot
+from .shot import check_same_shot
 
 # A panel is drawn with every move of the mouse; a description is read when it has changed.
 _read: dict[Path, tuple[int, CaptureSet | Field | None]] = {}

@@ -13,8 +13,10 @@ from ...core.choice import CHOICES
 from ...core.errors import ArtoError, CancelledError
 from ...core.hemicube import FACE_NAMES, PRESETS
 from ...core.patterns import PATTERN_SETS
-from . import capture, fit, relight
-from .work import ProgressLines, run
+from ..capture.capture import capture
+from ..fit import fit
+from ..relight.relight import relight
+from ..work import ProgressLines, run
 
 _commands: list[Any] = []
 
@@ -92,9 +94,9 @@ def main(arguments: list[str]) -> int:
                 print(f"ARTO: --{option} {value} is out of range", file=sys.stderr)
                 return 2
     steps = {
-        "capture": lambda: capture.capture(scene, layer),
-        "fit": lambda: fit.fit(scene),
-        "relight": lambda: relight.relight(scene),
+        "capture": lambda: capture(scene, layer),
+        "fit": lambda: fit(scene),
+        "relight": lambda: relight(scene),
     }[job]
     try:
         run(steps(), ProgressLines(job))

@@ -7,10 +7,14 @@ import time
 import bpy
 
 from ...core.errors import ArtoError, CancelledError
-from . import capture, fit, hemicube_planes, paths, relight
-from .bounds import scene_bounds
-from .stage import stage
-from .work import Progress, ProgressLines, Render, Steps, run
+from ..capture import planes
+from ..capture.capture import capture
+from ..fit import fit
+from ..relight.relight import relight
+from ..shot import paths
+from ..stage.bounds import scene_bounds
+from ..stage.stage import stage
+from ..work import Progress, ProgressLines, Render, Steps, run
 
 # Steps are taken for this long before the window is drawn again.
 SECONDS_A_TICK = 0.1
@@ -43,8 +47,8 @@ capturing uses its geometry"""
         scene = context.scene
         with stage(scene, context.view_layer.name) as on:
             centre, radius = scene_bounds(on)
-        hemicube = hemicube_planes.wanted(scene, centre, radius)
-        hemicube_planes.build_for_artist(scene, hemicube, radius)
+        hemicube = planes.wanted(scene, centre, radius)
+        planes.build_for_artist(scene, hemicube, radius)
         return (
             f"{len(hemicube)} patches at {hemicube.size:.4g} around a scene of radius "
             f"{radius:.4g}: parallax {hemicube.parallax_degrees(radius):.2g} degrees"
@@ -60,13 +64,13 @@ class ARTO_OT_remove_hemicube(_Quick):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if hemicube_planes.of_artist(context.scene) is None:
+        if planes.of_artist(context.scene) is None:
             cls.poll_message_set("There is no hemicube in this scene")
             return False
         return True
 
     def work(self, context: bpy.types.Context) -> str:
-        hemicube_planes.remove_for_artist(context.scene)
+        planes.remove_for_artist(context.scene)
         return "removed the hemicube"
 
 
@@ -187,7 +191,7 @@ class ARTO_OT_capture(_Work):
         return True
 
     def steps(self, context: bpy.types.Context) -> Steps:
-        return capture.capture(context.scene, context.view_layer.name)
+        return capture(context.scene, context.view_layer.name)
 
 
 class ARTO_OT_fit(_Work):
@@ -201,7 +205,7 @@ class ARTO_OT_fit(_Work):
         return _there(cls, context, paths.capture_folder, "capture.json", "Capture the scene first")
 
     def steps(self, context: bpy.types.Context) -> Steps:
-        return fit.fit(context.scene)
+        return fit(context.scene)
 
 
 class ARTO_OT_relight(_Work):
@@ -218,7 +222,7 @@ class ARTO_OT_relight(_Work):
         return _there(cls, context, paths.field_folder, "field.json", "Fit the capture first")
 
     def steps(self, context: bpy.types.Context) -> Steps:
-        return relight.relight(context.scene)
+        return relight(context.scene)
 
 
 def _there(cls: type, context: bpy.types.Context, folder: object, name: str, say: str) -> bool:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import bpy
 
 from ...core.hemicube import SIDES
-from . import hemicube_planes, status
+from ..capture import planes
+from ..shot import status
 
 
 def _line(column: bpy.types.UILayout, found: tuple[str, bool] | None) -> None:
@@ -30,7 +31,7 @@ class ARTO_PT_main(_Panel, bpy.types.Panel):
         column.use_property_split = True
         column.use_property_decorate = False
         settings = context.scene.arto
-        there = hemicube_planes.built(context.scene)
+        there = planes.built(context.scene)
         row = column.row(align=True)
         row.operator("arto.build_hemicube", icon="MESH_CUBE")
         row.operator("arto.remove_hemicube", text="", icon="TRASH")

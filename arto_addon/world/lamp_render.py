@@ -19,9 +19,9 @@ from ...core.environment import Environment
 from ...core.errors import SceneError
 from ...core.field import Field
 from ...core.region import Region
-from .capture import prepare
-from .stage import Stage, set_region, stage
-from .work import Render, Steps
+from ..stage.settings import prepare
+from ..stage.stage import Stage, set_region, stage
+from ..work import Render, Steps
 
 GROUP = "ARTO_lamps"
 

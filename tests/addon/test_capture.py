@@ -9,7 +9,9 @@ import subprocess
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import capture, fit, paths, work
+from arto.arto_addon import fit, work
+from arto.arto_addon.capture import capture
+from arto.arto_addon.shot import paths
 from arto.core import exr
 from arto.core.capture_set import GROUP
 from arto.core.errors import ArtoError, CancelledError, CaptureSetError, SceneError

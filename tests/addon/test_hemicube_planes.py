@@ -7,9 +7,9 @@ import math
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import hemicube_planes
-from arto.arto_addon.bounds import scene_bounds
-from arto.arto_addon.stage import stage
+from arto.arto_addon.capture import planes
+from arto.arto_addon.stage.bounds import scene_bounds
+from arto.arto_addon.stage.stage import stage
 from arto.core.errors import SceneError
 from arto.core.patterns import PATTERN_SETS
 from scene_tools import BOX, add_mesh, captured, differences, snapshot
@@ -88,11 +88,11 @@ def test_build_and_remove(scene):
     before = snapshot()
     scene.arto.patches = 2
     bpy.ops.arto.build_hemicube()
-    collection = hemicube_planes.of_artist(scene)
+    collection = planes.of_artist(scene)
     assert len(collection.objects) == 24
     assert collection.hide_render
     assert not any(o.visible_camera for o in collection.objects)
-    hemicube, radius = hemicube_planes.built(scene)
+    hemicube, radius = planes.built(scene)
     assert hemicube.size == pytest.approx(1000 * radius)
     # the corners of the planes are those of the patches
     plane = collection.objects[5]
@@ -116,7 +116,7 @@ def test_built_hemicube_does_not_change_the_radius(scene):
 def test_capture_uses_the_built_hemicube_and_says_when_it_is_old(scene):
     bpy.ops.arto.build_hemicube()
     add_mesh(scene, "Late", *BOX).location = (0, 0, 3)
-    built, _ = hemicube_planes.built(scene)
+    built, _ = planes.built(scene)
     assert captured(scene).hemicube == built
     scene.arto.patches = 3
     with pytest.raises(SceneError, match="press Build Hemicube again"):
@@ -126,14 +126,14 @@ def test_capture_uses_the_built_hemicube_and_says_when_it_is_old(scene):
 def test_presets_and_alignment(scene):
     settings = scene.arto
     settings.preset = "paper"
-    wanted = hemicube_planes.wanted(scene, (0, 0, 0), 1.0)
+    wanted = planes.wanted(scene, (0, 0, 0), 1.0)
     assert wanted.faces == ("top", "left", "right", "back")
     assert wanted.half_sides
     settings.align = "camera"
     scene.camera.rotation_euler = (math.radians(70), 0, math.radians(-90))
     bpy.context.view_layer.update()
     # turned so, the camera looks along +X: that is where Back is
-    back = hemicube_planes.wanted(scene, (0, 0, 0), 1.0).frame("back")[0]
+    back = planes.wanted(scene, (0, 0, 0), 1.0).frame("back")[0]
     np.testing.assert_allclose(back, (1, 0, 0), atol=1e-6)
 
 

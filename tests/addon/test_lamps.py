@@ -5,8 +5,11 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import fit, lamps, paths, relight, work
-from arto.arto_addon.world import bake
+from arto.arto_addon import fit, work
+from arto.arto_addon.relight import relight
+from arto.arto_addon.shot import paths
+from arto.arto_addon.world import lamp_render as lamps
+from arto.arto_addon.world.bake import bake
 from arto.core import exr
 from arto.core.environment import Environment
 from arto.core.errors import SceneError

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from arto.arto_addon import capture, fit, relight, work
+from arto.arto_addon import fit, work
+from arto.arto_addon.capture import capture
+from arto.arto_addon.relight import relight
 from arto.core import exr
 from arto.core.errors import HemicubeError
 from scene_tools import assert_as_cycles, captured, differences, set_colour, small_scene, snapshot

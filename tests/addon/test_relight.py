@@ -8,8 +8,10 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import denoise, fit, paths, plate, relight, work
-from arto.arto_addon.world import bake
+from arto.arto_addon import fit, work
+from arto.arto_addon.relight import denoise, plate, relight
+from arto.arto_addon.shot import paths
+from arto.arto_addon.world.bake import bake
 from arto.core import exr
 from arto.core.errors import ArtoError, CaptureSetError, FieldError, SceneError
 from arto.core.field import Field

@@ -6,7 +6,8 @@ import json
 import os
 
 import bpy
-from arto.arto_addon import fit, paths, status, work
+from arto.arto_addon import fit, work
+from arto.arto_addon.shot import paths, status
 from scene_tools import captured, small_scene
 
 

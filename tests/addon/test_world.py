@@ -7,7 +7,8 @@ import math
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import world
+from arto.arto_addon.world.background import background
+from arto.arto_addon.world.bake import bake
 from arto.core.errors import SceneError
 from arto.core.region import Region
 from scene_tools import set_colour
@@ -40,14 +41,14 @@ def smooth(height=64):
 
 def test_plain_colour_with_strength(scene):
     set_colour(scene, (0.2, 0.4, 0.8), strength=3)
-    image = world.bake(scene, 64).image
+    image = bake(scene, 64).image
     np.testing.assert_allclose(image, np.broadcast_to([0.6, 1.2, 2.4], image.shape), rtol=1e-5)
 
 
 def test_environment_texture_comes_back_texel_by_texel(scene):
     pixels = smooth()
     hdri(scene, pixels)
-    image = world.bake(scene, 128).image
+    image = bake(scene, 128).image
     # all but the seam and the poles, where Cycles interpolates over the rim
     np.testing.assert_allclose(image[2:-2, 2:-2], pixels[2:-2, 2:-2], atol=0.02)
 
@@ -55,7 +56,7 @@ def test_environment_texture_comes_back_texel_by_texel(scene):
 def test_mapping_turns_the_world(scene):
     pixels = smooth()
     hdri(scene, pixels, rotation=math.pi / 2)
-    image = world.bake(scene, 128).image
+    image = bake(scene, 128).image
     # the mapping turns the direction that is looked up, so what is shown turns the other way
     turned, other = np.roll(pixels, 32, axis=1), np.roll(pixels, -32, axis=1)
     assert np.abs(image - turned)[2:-2].mean() < 0.02
@@ -72,7 +73,7 @@ def test_mix_of_worlds_adds_up(scene):
     tree.links.new(tree.nodes["Background"].outputs[0], mix.inputs[1])
     tree.links.new(second.outputs[0], mix.inputs[2])
     tree.links.new(mix.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
-    image = world.bake(scene, 64).image
+    image = bake(scene, 64).image
     np.testing.assert_allclose(image, np.broadcast_to([0.75, 0.5, 0], image.shape), atol=1e-5)
 
 
@@ -107,7 +108,7 @@ def sun(scene, elevation, azimuth=0.7321):
 @pytest.mark.parametrize("elevation", [60, 15, 3])
 def test_sun_of_half_a_degree_keeps_its_energy(scene, elevation):
     expected = sun(scene, math.radians(elevation))
-    np.testing.assert_allclose(world.bake(scene, 1024).irradiance(), expected, rtol=0.01)
+    np.testing.assert_allclose(bake(scene, 1024).irradiance(), expected, rtol=0.01)
 
 
 def test_sun_that_is_seen_behind_keeps_its_energy(scene):
@@ -118,11 +119,11 @@ def test_sun_that_is_seen_behind_keeps_its_energy(scene):
     scene.camera.data.angle = math.radians(12)
     scene.render.resolution_x, scene.render.resolution_y = 64, 48
     scene.render.resolution_percentage = 100
-    picture = world.background(scene)
+    picture = background(scene)
     pixel = (2 * math.tan(math.radians(6)) / 64) ** 2  # its solid angle in the middle
     np.testing.assert_allclose(picture.sum(axis=(0, 1)) * pixel, expected, rtol=0.01)
     region = Region(30, 10, 20, 16)
-    part = world.background(scene, region)
+    part = background(scene, region)
     inside = np.zeros(part.shape, bool)
     inside[region.slices] = True
     assert (part[~inside] == 0).all() and part.max() > 1e4
@@ -136,10 +137,10 @@ def test_sky_texture_with_its_sun(scene):
     sky = tree.nodes.new("ShaderNodeTexSky")
     sky.sun_elevation, sky.sun_rotation = math.radians(40), 0.3
     tree.links.new(sky.outputs[0], tree.nodes["Background"].inputs["Color"])
-    coarse, fine = (world.bake(scene, w).irradiance() for w in (512, 2048))
+    coarse, fine = (bake(scene, w).irradiance() for w in (512, 2048))
     np.testing.assert_allclose(coarse, fine, rtol=0.01)
     sky.sun_disc = False
-    assert (world.bake(scene, 512).irradiance() < 0.8 * coarse).all()
+    assert (bake(scene, 512).irradiance() < 0.8 * coarse).all()
 
 
 def test_world_that_shows_the_camera_something_else(scene):
@@ -154,15 +155,15 @@ def test_world_that_shows_the_camera_something_else(scene):
     tree.links.new(tree.nodes["Background"].outputs[0], mix.inputs[1])
     tree.links.new(shown.outputs[0], mix.inputs[2])
     tree.links.new(mix.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
-    np.testing.assert_allclose(world.bake(scene, 64).image.mean(axis=(0, 1)), (0, 1, 0), atol=1e-4)
-    np.testing.assert_allclose(world.background(scene).mean(axis=(0, 1)), (1, 0, 0), atol=1e-4)
+    np.testing.assert_allclose(bake(scene, 64).image.mean(axis=(0, 1)), (0, 1, 0), atol=1e-4)
+    np.testing.assert_allclose(background(scene).mean(axis=(0, 1)), (1, 0, 0), atol=1e-4)
 
 
 def test_world_hidden_from_the_camera_still_lights(scene):
     set_colour(scene, (0.5, 0.5, 0.5))
     scene.world.cycles_visibility.camera = False
-    np.testing.assert_allclose(world.bake(scene, 64).image, 0.5, atol=1e-4)
-    assert world.background(scene).max() == 0
+    np.testing.assert_allclose(bake(scene, 64).image, 0.5, atol=1e-4)
+    assert background(scene).max() == 0
 
 
 def test_no_world_and_missing_image(scene, tmp_path):
@@ -171,18 +172,18 @@ def test_no_world_and_missing_image(scene, tmp_path):
     missing.source, missing.filepath = "FILE", str(tmp_path / "gone.exr")
     texture.image = missing
     with pytest.raises(SceneError, match=r"gone\.exr"):
-        world.bake(scene, 64)
+        bake(scene, 64)
     texture.image = None
     with pytest.raises(SceneError, match="has no image"):
-        world.bake(scene, 64)
+        bake(scene, 64)
     scene.world = None
     with pytest.raises(SceneError, match="no world"):
-        world.bake(scene, 64)
+        bake(scene, 64)
 
 
 def test_nothing_is_left_behind(scene):
     kinds = ("scenes", "worlds", "objects", "cameras", "meshes", "materials")
     before = {k: len(getattr(bpy.data, k)) for k in kinds}
-    world.bake(scene, 64)
-    world.background(scene)
+    bake(scene, 64)
+    background(scene)
     assert {k: len(getattr(bpy.data, k)) for k in kinds} == before

@@ -1,0 +1,1 @@
+"""What differs between versions of Blender: asked for here, and nowhere else."""

@@ -1,0 +1,58 @@
+"""The plan of a capture: its region, cut into tiles that fit the memory, and their renders."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import bpy
+
+from ...core.errors import SceneError
+from ...core.hemicube import Hemicube
+from ...core.region import Region
+from ..stage.stage import picture_size
+
+# Cycles and Blender's result each hold a group's pass: 3 floats, twice.
+BYTES_PER_PASS = 24
+OTHER_PASSES = 8
+
+
+def tiles_of(region: Region, passes: int, budget_megabytes: int) -> list[Region]:
+    """Cut a region into strips whose passes fit the budget."""
+    row = region.width * (passes + OTHER_PASSES) * BYTES_PER_PASS
+    rows = budget_megabytes * 2**20 // row
+    if rows < 1:
+        raise SceneError(
+            f"a single row of the picture takes {row / 2**20:.0f} MB in {passes} passes: raise "
+            "the memory budget, or capture fewer patches or patterns"
+        )
+    count = -(-region.height // rows)
+    edges = [region.height * i // count for i in range(count + 1)]
+    return [
+        Region(region.x, region.y + a, region.width, b - a) for a, b in itertools.pairwise(edges)
+    ]
+
+
+def render_plan(
+    route: str, hemicube: Hemicube, names: Sequence[str]
+) -> list[list[tuple[int, str]]]:
+    """The (patch, pattern name) images of each render."""
+    k = range(len(hemicube))
+    if route == "all":
+        return [[(i, name) for i in k for name in names]]
+    if route == "pattern":
+        return [[(i, name) for i in k] for name in names]
+    return [[(i, name)] for i in k for name in names]
+
+
+def picture_region(scene: bpy.types.Scene) -> Region:
+    """What the scene renders of its picture: all of it, or the artist's render region."""
+    width, height = picture_size(scene)
+    r = scene.render
+    if not r.use_border:
+        return Region(0, 0, width, height)
+    x0, x1 = int(r.border_min_x * width + 0.5), int(r.border_max_x * width + 0.5)
+    y0, y1 = int(r.border_min_y * height + 0.5), int(r.border_max_y * height + 0.5)
+    if x1 <= x0 or y1 <= y0:
+        raise SceneError("the render region is empty: draw it again, or turn it off")
+    return Region(x0, height - y1, x1 - x0, y1 - y0)

@@ -1,0 +1,1 @@
+"""What the artist touches: settings, buttons, panels, the command line."""

@@ -1,0 +1,45 @@
+"""What a world must have before it can light anything."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+from ...core.errors import SceneError
+from ..blender.nodes import trees
+
+
+def check_world(scene: bpy.types.Scene) -> None:
+    """Raise SceneError for a scene without a world, or one whose images are missing."""
+    world = scene.world
+    if world is None:
+        raise SceneError(
+            "the scene has no world to relight with: add one with an HDRI (World properties)"
+        )
+    check_no_volume(world)
+    for tree in trees(world.node_tree, set()):
+        for node in tree.nodes:
+            if node.bl_idname not in {"ShaderNodeTexEnvironment", "ShaderNodeTexImage"}:
+                continue
+            image = node.image
+            if image is None:
+                if any(o.is_linked for o in node.outputs):
+                    raise SceneError(f"the world's node '{node.name}' has no image: choose an HDRI")
+            elif image.source == "FILE" and not image.packed_file:
+                path = Path(bpy.path.abspath(image.filepath, library=image.library))
+                if not path.is_file():
+                    raise SceneError(
+                        f"the world's image '{image.name}' is missing on disk ({path}): find it "
+                        "again (File, External Data, Find Missing Files), or choose another"
+                    )
+
+
+def check_no_volume(world: bpy.types.World) -> None:
+    """Raise SceneError for a world filled with fog: it swallows light from afar, an HDRI's too."""
+    out = world.node_tree.get_output_node("CYCLES") if world.node_tree else None
+    if out and out.inputs["Volume"].is_linked:
+        raise SceneError(
+            "the world has a volume, which swallows all light from afar: put the fog into an "
+            "object around the scene instead"
+        )
