@@ -7,7 +7,6 @@ picture (`Combined`, with alpha) and its albedo, normal and depth: docs/capture-
 
 from __future__ import annotations
 
-import contextlib
 import json
 import re
 from collections.abc import Iterator
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 
 from . import exr
 from .errors import ArtoError, CaptureSetError, ExrError
+from .files import write_text
 from .hemicube import Hemicube
 from .patterns import PatternSet, pattern_set
 from .region import Region
@@ -211,14 +211,9 @@ class CaptureSet:
 def write_header(folder: Path, head: dict[str, Any]) -> None:
     """Write `capture.json`, whole or not at all."""
     path = folder / HEADER
-    partial = path.with_name(HEADER + ".part")
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        partial.write_text(json.dumps(head, indent=1))
-        partial.replace(path)
+        write_text(path, json.dumps(head, indent=1))
     except OSError as e:
-        with contextlib.suppress(OSError):
-            partial.unlink()
         raise CaptureSetError(
             f"{path} cannot be written ({e}): make room on the disk, or choose a folder that can "
             "be written"

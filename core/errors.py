@@ -33,5 +33,9 @@ class SceneError(ArtoError):
     """A Blender scene that cannot be captured or relit as it stands."""
 
 
+class BusyError(ArtoError):
+    """Another process is at work on the same shot."""
+
+
 class CancelledError(ArtoError):
     """The artist stopped the work. Whatever was finished is kept."""

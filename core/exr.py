@@ -8,7 +8,6 @@ allocator that Blender puts in malloc's place, and Blender aborts.
 
 from __future__ import annotations
 
-import contextlib
 import mmap
 import struct
 from collections.abc import Iterator
@@ -19,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import ExrError
+from .files import whole
 
 # No name in a header is longer.
 _LONGEST_TEXT = 256
@@ -173,19 +173,15 @@ def write(
             head["colorInteropID"] = COLOUR_SPACES[colour_space]
         head["colorSpace"] = colour_space
         parts.append(exr.Part({**head, **(attributes or {})}, channels, name))
-    partial = path.with_name(path.name + ".part")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        exr.File(parts).write(str(partial))
-        # the library says nothing when the last bytes find no room
-        try:
-            _check_complete(partial)
-        except ExrError:
-            raise OSError("it came out incomplete") from None
-        partial.replace(path)
+        with whole(path) as partial:
+            exr.File(parts).write(str(partial))
+            # the library says nothing when the last bytes find no room
+            try:
+                _check_complete(partial)
+            except ExrError:
+                raise OSError("it came out incomplete") from None
     except (OSError, RuntimeError) as e:
-        with contextlib.suppress(OSError):
-            partial.unlink()
         raise ExrError(
             f"{path} cannot be written ({e}): make room on the disk, or choose a folder that "
             "can be written"

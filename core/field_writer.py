@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from .errors import FieldError
 from .field import HEADER, VERSION
+from .files import PART, replace_folder
 from .hemicube import Hemicube
 from .region import Region
 from .supports import BY_CODE
@@ -61,7 +62,7 @@ class FieldWriter:
 
     def __init__(self, folder: Path, hemicube: Hemicube, shape: tuple[int, int], **about: Any):
         self.folder = folder
-        self.partial = folder.with_name(folder.name + ".part")
+        self.partial = folder.with_name(folder.name + PART)
         self.head: dict[str, Any] = {
             "format": "ARTO reflectance field",
             "version": VERSION,
@@ -88,17 +89,7 @@ class FieldWriter:
     def close(self) -> None:
         with _writing(self.folder):
             (self.partial / HEADER).write_text(json.dumps(self.head, indent=1))
-            old = self.folder.with_name(self.folder.name + ".old")
-            if self.folder.exists():
-                shutil.rmtree(old, ignore_errors=True)
-                self.folder.rename(old)
-            try:
-                self.partial.rename(self.folder)
-            except OSError:
-                if old.exists():
-                    old.rename(self.folder)
-                raise
-            shutil.rmtree(old, ignore_errors=True)
+            replace_folder(self.partial, self.folder)
 
     def abandon(self) -> None:
         """Remove what was written; a field that was there before stays."""

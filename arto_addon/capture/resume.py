@@ -9,6 +9,7 @@ from typing import Any
 
 from ...core.capture_set import HEADER, CaptureSet
 from ...core.errors import ArtoError, CaptureSetError
+from ...core.files import replace_folder
 
 
 def unfinished(folder: Path, key: str) -> dict[str, Any] | None:
@@ -31,15 +32,8 @@ def empty(folder: Path) -> None:
 
 def finish(unfinished: Path, folder: Path) -> None:
     """Put the complete capture set where the last one is."""
-    old = folder.with_name(folder.name + ".old")
     try:
-        if folder.exists():
-            if old.exists():  # a crash left it
-                shutil.rmtree(old)
-            folder.replace(old)
-        unfinished.replace(folder)
-        if old.exists():
-            shutil.rmtree(old)
+        replace_folder(unfinished, folder)
     except OSError as e:
         raise CaptureSetError(
             f"{unfinished} is complete but cannot take the place of {folder} ({e}): close what "
