@@ -4,20 +4,29 @@ from __future__ import annotations
 
 import bpy
 
-from .ui import cli, operators, panels, properties
+from .job import session
+from .shot import scene_id, watch
+from .ui import cli, operators, panels, preferences, properties, window
 
-_CLASSES = (*properties.CLASSES, *operators.CLASSES, *panels.CLASSES)
+_CLASSES = (
+    *properties.CLASSES,
+    *preferences.CLASSES,
+    *operators.CLASSES,
+    *panels.CLASSES,
+)
+# In this order; the other way round to unregister.
+_MODULES = (properties, scene_id, watch, session, window, cli)
 
 
 def register() -> None:
     for cls in _CLASSES:
         bpy.utils.register_class(cls)
-    properties.attach()
-    cli.register()
+    for module in _MODULES:
+        module.register()
 
 
 def unregister() -> None:
-    cli.unregister()
-    properties.detach()
+    for module in reversed(_MODULES):
+        module.unregister()
     for cls in reversed(_CLASSES):
         bpy.utils.unregister_class(cls)

@@ -4,30 +4,41 @@ from __future__ import annotations
 
 import bpy
 
-from ..core.capture_set import HEADER, CaptureSet
+from ..core.capture_set import CaptureSet
+from ..core.errors import CaptureSetError
+from ..core.files import Lock
 from ..core.fit import fit as fit_captured
-from .shot import paths
-from .shot.shot import check_same_shot
+from .shot import paths, status
+from .shot.shot import check_same_shot, layer_of, shot_of
 from .work import Progress, Steps
 
 
-def fit(scene: bpy.types.Scene) -> Steps:
+def fit(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     """Fit the scene's capture set to a reflectance field; returns its folder.
 
-    Raises CaptureSetError, FieldError, PatternError; a field that was there stays until the new
-    one is complete.
+    Raises CaptureSetError, ShotError, FieldError, PatternError, BusyError; a field that was there
+    stays until the new one is complete.
     """
-    folder = paths.capture_folder(scene)
-    unfinished = paths.unfinished_capture_folder(scene)
-    if not (folder / HEADER).is_file() and (unfinished / HEADER).is_file():
-        folder = unfinished  # which says how far it is
+    layer = view_layer or layer_of(scene)
+    scene.view_layers[layer].update()
+    folder = paths.capture_folder(scene, layer)
+    place = paths.place(scene, layer)
+    if not folder.exists() and (stopped := status.unfinished(place.source)):
+        raise CaptureSetError(
+            f"the capture is unfinished ({stopped[0]}): run Capture again, it goes on from there"
+        )
+    if not folder.exists():
+        check_same_shot(scene, paths.nearest(scene, layer), "the capture set", layer)
     captured = CaptureSet(folder)
-    check_same_shot(scene, captured.head, "the capture set")
-    folder = paths.field_folder(scene)
-    about = {"shot": captured.head.get("shot", {})}
-    settings = scene.arto
-    work = fit_captured(captured, folder, settings.support, settings.separate, **about)
-    for share, text in work:
-        yield Progress(share, text)
+    check_same_shot(scene, captured.head.get("shot"), "the capture set", layer)
+    # a capture set of the version before is read where it is; its field goes where fields are now
+    target = (paths.claim(scene, layer) if place.earlier else place.folder) / "field"
+    with Lock(target.parent, f"fitting {shot_of(scene, layer).title}"):
+        about = {"shot": captured.head.get("shot", {})}
+        settings = scene.arto
+        work = fit_captured(captured, target, settings.support, settings.separate, **about)
+        for share, text in work:
+            yield Progress(share, text)
+    paths.forget()
     yield Progress(1.0, f"fitted {len(captured.hemicube)} patches of {captured.pixels} pixels")
-    return folder
+    return target

@@ -9,13 +9,16 @@ so there is one way out however it ends.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
 import bpy
 
 from ..core.errors import CancelledError, SceneError
+
+STOPPED = "cancelled: finished tiles are kept, run it again to go on"
 
 
 @dataclass
@@ -33,15 +36,34 @@ class Render:
     scene: str
     share: float
     text: str
+    span: float = 0.0  # how much of the whole work it is
     state: str = field(default="waiting")  # then "done" or "cancelled"
 
     def check(self) -> None:
         """Raise CancelledError unless the render came to its end."""
         if self.state != "done":
-            raise CancelledError("cancelled: finished tiles are kept, run it again to go on")
+            raise CancelledError(STOPPED)
 
 
 Steps = Generator[Progress | Render, None, Any]
+
+
+@contextmanager
+def last_properties_kept() -> Iterator[None]:
+    """Blender gives the next F12 what the last render was called with: it gets back what it had."""
+    last = bpy.context.window_manager.operator_properties_last("render.render")
+    names = (
+        [] if last is None else [p.identifier for p in last.bl_rna.properties if not p.is_readonly]
+    )
+    before = {n: getattr(last, n) if last.is_property_set(n) else None for n in names}
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                last.property_unset(name)
+            else:
+                setattr(last, name, value)
 
 
 def blocking_render(request: Render) -> None:
@@ -53,7 +75,8 @@ def blocking_render(request: Render) -> None:
 
     bpy.app.handlers.render_cancel.append(on_cancel)
     try:
-        result = bpy.ops.render.render(write_still=True, scene=request.scene)
+        with last_properties_kept():
+            result = bpy.ops.render.render(write_still=True, scene=request.scene)
     except KeyboardInterrupt:
         result = {"CANCELLED"}
     except RuntimeError as e:
@@ -75,7 +98,7 @@ def run(steps: Steps, say: Callable[[Progress | Render], None] | None = None) ->
     except StopIteration as end:
         return end.value
     except KeyboardInterrupt:
-        raise CancelledError("cancelled: finished tiles are kept, run it again to go on") from None
+        raise CancelledError(STOPPED) from None
     finally:
         steps.close()
 

@@ -33,6 +33,10 @@ class SceneError(ArtoError):
     """A Blender scene that cannot be captured or relit as it stands."""
 
 
+class ShotError(ArtoError):
+    """A description of a shot that is none, or a shot that is another's."""
+
+
 class BusyError(ArtoError):
     """Another process is at work on the same shot."""
 

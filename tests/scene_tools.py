@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 from arto.arto_addon import work
 from arto.arto_addon.capture import capture as capture_module
+from arto.arto_addon.shot import scene_id
 from arto.core.capture_set import CaptureSet
 
 WIDTH, HEIGHT = 24, 18
@@ -69,6 +70,8 @@ def small_scene(folder: Path, lamp: bool = False) -> bpy.types.Scene:
     settings.output = str(folder / "relit.exr")
     settings.samples, settings.patches = 64, 1
     settings.patterns, settings.grain, settings.adaptive = "moments", True, False
+    # the one thing of the artist's that a capture adds to is the scene's ID
+    scene_id.give(scene)
     # the physics is looked at as it is
     settings.denoise = settings.lamps = False
     return scene

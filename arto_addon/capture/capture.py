@@ -11,19 +11,21 @@ import bpy
 
 from ...core import exr
 from ...core.capture_set import GRAIN, GROUP, VERSION, describe, group_name, write_header
-from ...core.errors import CaptureSetError, SceneError
+from ...core.errors import ArtoError, CaptureSetError, SceneError
+from ...core.files import Lock, whole
 from ...core.hemicube import Hemicube
 from ...core.patterns import PatternSet, pattern_set
 from ...core.region import Region
-from ..shot import paths
-from ..shot.shot import shot
+from ..shot import home, paths
+from ..shot.fingerprint import fingerprint, key_of
+from ..shot.shot import shot_of
 from ..stage.bounds import scene_bounds
 from ..stage.settings import prepare
-from ..stage.stage import Stage, picture_size, set_region, stage
+from ..stage.stage import Stage, picture_region, set_region, stage
 from ..work import Progress, Render, Steps
 from . import planes
 from .check import check_scene
-from .plan import picture_region, render_plan, tiles_of
+from .plan import render_plan, tiles_of
 from .probe import refined
 from .resume import empty, finish, unfinished
 
@@ -62,27 +64,32 @@ def _check_file(path: Path, images: list[tuple[int, str]]) -> None:
 def capture(scene: bpy.types.Scene, view_layer: str) -> Steps:
     """Render the basis images of a scene into its capture set; returns the folder.
 
-    A set left unfinished by the same capture is gone on with; an earlier finished one stays until
-    the new one is complete. Raises SceneError, CaptureSetError,
-    ExrError, CancelledError; the scene stays as it is.
+    A set left unfinished by the same capture of the same scene is gone on with; an earlier finished
+    one stays until the new one is complete, and so do unfinished ones of other settings. Raises
+    SceneError, CaptureSetError, BusyError (another process captures this shot), ExrError,
+    CancelledError; the scene stays as it is, but for the ID that its shots are found by.
     """
     check_scene(scene)
+    # whatever a script has moved is where it should be
+    scene.view_layers[view_layer].update()
+    claimed = paths.claim(scene, view_layer)
+    with Lock(claimed, f"capturing {shot_of(scene, view_layer).title}"):
+        return (yield from _capture(scene, view_layer, claimed))
+
+
+def _capture(scene: bpy.types.Scene, view_layer: str, claimed: Path) -> Steps:
     settings = scene.arto
-    folder = paths.unfinished_capture_folder(scene)
     patterns = pattern_set(settings.patterns)
     region = picture_region(scene)
+    found = fingerprint(scene, view_layer, full=True)
     with stage(scene, view_layer) as on:
         hemicube = geometry(scene, on)
         # between renders the paths differ, and grain would not be theirs
         grain = settings.grain and settings.route == "all"
         names = [*patterns.patterns, *([GRAIN] if grain else [])]
         prepare(on, layers=len(names))
-        about = {
-            "scene": scene.name,
-            "file": bpy.data.filepath,
-            "view_layer": view_layer,
-            "shot": shot(scene),
-            "frame": scene.frame_current,
+        shot = shot_of(scene, view_layer, region)
+        decides = {
             "samples": settings.samples,
             "seed": settings.seed,
             "route": settings.route,
@@ -94,16 +101,29 @@ def capture(scene: bpy.types.Scene, view_layer: str) -> Steps:
             "film_transparent": scene.render.film_transparent,
             "changed": on.changed,
         }
-        size = picture_size(scene)[::-1]
-        asked = [describe(hemicube, patterns, size, **about), vars(region), settings.memory]
-        key = hashlib.sha256(json.dumps([asked, VERSION], sort_keys=True).encode()).hexdigest()[:16]
+        size = (shot.height, shot.width)
+        # names are not in it: a renamed file or scene goes on with what it has
+        frame = [shot.camera_matrix, shot.lens, shot.frame, shot.subframe, shot.view_layer]
+        asked = [describe(hemicube, patterns, size, **decides), vars(region), frame]
+        asked += [settings.memory, key_of(found), VERSION]
+        key = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:16]
+        folder = paths.unfinished_folder(claimed, key)
         head = unfinished(folder, key)
         if head is None:
             if settings.adaptive:
                 hemicube = yield from refined(on, hemicube, ADAPTIVE_SHARE * len(hemicube))
             plan = render_plan(settings.route, hemicube, names)
             tiles = tiles_of(region, max(map(len, plan)), settings.memory)
-            head = describe(hemicube, patterns, size, key=key, **about)
+            about = {
+                "scene": scene.name,
+                "file": home.file(),
+                "view_layer": view_layer,
+                "shot": shot.to_json(),
+                "frame": scene.frame_current,
+                "fingerprint": found,
+            }
+            head = describe(hemicube, patterns, size, key=key, **decides, **about)
+            head["seconds"] = 0.0
             head["tiles"] = [
                 {"region": [t.x, t.y, t.width, t.height], "files": [], "done": False} for t in tiles
             ]
@@ -111,7 +131,6 @@ def capture(scene: bpy.types.Scene, view_layer: str) -> Steps:
         hemicube = Hemicube.from_json(head["hemicube"])
         plan = render_plan(settings.route, hemicube, names)
         tiles = [Region(*t["region"]) for t in head["tiles"]]
-        head["seconds"] = 0.0
         write_header(folder, head)
         total = len(plan) * len(tiles)
         for t, tile in enumerate(tiles):
@@ -125,15 +144,30 @@ def capture(scene: bpy.types.Scene, view_layer: str) -> Steps:
                 at = t * len(plan) + i
                 text = f"render {at + 1} of {total}: {len(images)} basis images"
                 name = f"tile_{t:04d}.exr" if len(plan) == 1 else f"tile_{t:04d}_{i:04d}.exr"
-                begun = time.perf_counter()
-                yield from _render(on, hemicube, patterns, images, folder / name, at / total, text)
-                head["seconds"] += time.perf_counter() - begun
+                # a process that was killed may have finished it without noting it down
+                if not _is_whole(folder / name, images):
+                    begun = time.perf_counter()
+                    work = Render(on.scene.name, at / total, text, 1 / total)
+                    yield from _render(on, hemicube, patterns, images, folder / name, work)
+                    head["seconds"] += time.perf_counter() - begun
                 entry["files"].append(name)
             entry["done"] = True
             write_header(folder, head)
-    finish(folder, paths.capture_folder(scene))
+    finish(folder, claimed / "capture")
+    paths.forget()
     yield Progress(1.0, f"captured {len(hemicube)} patches in {total} renders")
-    return paths.capture_folder(scene)
+    return claimed / "capture"
+
+
+def _is_whole(path: Path, images: list[tuple[int, str]]) -> bool:
+    """Whether the basis images of a render are there already."""
+    if not path.is_file():
+        return False
+    try:
+        _check_file(path, images)
+    except ArtoError:
+        return False  # rendered again
+    return True
 
 
 def _render(
@@ -142,14 +176,11 @@ def _render(
     patterns: PatternSet,
     images: list[tuple[int, str]],
     path: Path,
-    share: float,
-    text: str,
+    request: Render,
 ) -> Steps:
     """One render of some basis images into `path`."""
-    partial = path.with_name(path.name + ".part")
-    on.scene.render.filepath = str(partial)
-    request = Render(on.scene.name, share, text)
-    try:
+    with whole(path) as partial:
+        on.scene.render.filepath = str(partial)
         with planes.lit(on, hemicube, patterns, images):
             yield request
             request.check()
@@ -159,6 +190,3 @@ def _render(
                 "can be written"
             )
         _check_file(partial, images)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)

@@ -5,12 +5,9 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 
-import bpy
-
 from ...core.errors import SceneError
 from ...core.hemicube import Hemicube
 from ...core.region import Region
-from ..stage.stage import picture_size
 
 # Cycles and Blender's result each hold a group's pass: 3 floats, twice.
 BYTES_PER_PASS = 24
@@ -43,16 +40,3 @@ def render_plan(
     if route == "pattern":
         return [[(i, name) for i in k] for name in names]
     return [[(i, name)] for i in k for name in names]
-
-
-def picture_region(scene: bpy.types.Scene) -> Region:
-    """What the scene renders of its picture: all of it, or the artist's render region."""
-    width, height = picture_size(scene)
-    r = scene.render
-    if not r.use_border:
-        return Region(0, 0, width, height)
-    x0, x1 = int(r.border_min_x * width + 0.5), int(r.border_max_x * width + 0.5)
-    y0, y1 = int(r.border_min_y * height + 0.5), int(r.border_max_y * height + 0.5)
-    if x1 <= x0 or y1 <= y0:
-        raise SceneError("the render region is empty: draw it again, or turn it off")
-    return Region(x0, height - y1, x1 - x0, y1 - y0)

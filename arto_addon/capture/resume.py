@@ -9,7 +9,7 @@ from typing import Any
 
 from ...core.capture_set import HEADER, CaptureSet
 from ...core.errors import ArtoError, CaptureSetError
-from ...core.files import replace_folder
+from ...core.files import PART, replace_folder
 
 
 def unfinished(folder: Path, key: str) -> dict[str, Any] | None:
@@ -18,6 +18,9 @@ def unfinished(folder: Path, key: str) -> dict[str, Any] | None:
         with contextlib.suppress(ArtoError):
             there = CaptureSet(folder, unfinished=True).head
             if there.get("key") == key:
+                # what a process that was killed was writing
+                for partial in folder.glob("*" + PART):
+                    partial.unlink(missing_ok=True)
                 return there
     return None
 

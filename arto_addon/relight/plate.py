@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core import exr
+from ..shot import paths
 
 IMAGE = "ARTO Relit"
-GROUP = "ARTO Relit"
+# The image node in a plate's group.
+SOURCE = "ARTO Relit"
 
 
 def write(path: Path, picture: NDArray[np.float32], about: dict[str, str]) -> None:
@@ -21,37 +23,59 @@ def write(path: Path, picture: NDArray[np.float32], about: dict[str, str]) -> No
     exr.write(path, {"": picture}, {f"arto.{k}": v for k, v in about.items()}, space)
 
 
-def show(path: Path) -> bpy.types.Image:
-    """The image data-block of the plate, loaded anew."""
-    image = bpy.data.images.get(IMAGE)
+def name_of(scene: bpy.types.Scene, look: str | None = None) -> str:
+    """The name of the plate's image and node group: of this scene and look, and no other's."""
+    name = paths.relit_name(scene, look)
+    return f"ARTO {name}" if name else IMAGE
+
+
+def present(scene: bpy.types.Scene, path: Path, look: str | None = None) -> bpy.types.Image:
+    """Show a plate that was written: its image, and its node in the scene's compositor.
+
+    look: that it was made for (default: the scene's now). In the window that is one step that can
+    be undone.
+    """
+    name = name_of(scene, look)
+    image = show(path, name)
+    wire(scene, node_group(image, name))
+    if not bpy.app.background and bpy.context.window_manager.windows:
+        bpy.ops.ed.undo_push(message="Relight")
+    return image
+
+
+def show(path: Path, name: str = IMAGE) -> bpy.types.Image:
+    """The image data-block of a plate, loaded anew."""
+    image = bpy.data.images.get(name)
     relative = bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
     if image is None:
         image = bpy.data.images.load(str(path))
-        image.name = IMAGE
+        image.name = name
     image.source = "FILE"
     image.filepath = relative
     image.reload()
     image.colorspace_settings.name = bpy.data.colorspace.working_space
     image.alpha_mode = "PREMUL"
+    # the image editor shows it as it shows a render: exposure, AgX
+    image.use_view_as_render = True
     # the node group is enough of a user only once it is there
     image.use_fake_user = True
     return image
 
 
-def node_group(image: bpy.types.Image) -> Any:
-    """The compositor node group that shows the plate; made once, then kept up to date."""
-    tree = bpy.data.node_groups.get(GROUP)
+def node_group(image: bpy.types.Image, name: str = IMAGE) -> Any:
+    """The compositor node group that shows a plate; made once, then kept up to date."""
+    tree = bpy.data.node_groups.get(name)
     if tree is None or tree.bl_idname != "CompositorNodeTree":
-        tree = bpy.data.node_groups.new(GROUP, "CompositorNodeTree")
+        tree = bpy.data.node_groups.new(name, "CompositorNodeTree")
         tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
         tree.interface.new_socket("Alpha", in_out="OUTPUT", socket_type="NodeSocketFloat")
         source = tree.nodes.new("CompositorNodeImage")
-        source.name = IMAGE
+        source.name = SOURCE
         out = tree.nodes.new("NodeGroupOutput")
         out.location = (300, 0)
         tree.links.new(source.outputs["Image"], out.inputs["Image"])
         tree.links.new(source.outputs["Alpha"], out.inputs["Alpha"])
-    source = tree.nodes.get(IMAGE)
+    source = tree.nodes.get(SOURCE)
     if source:
         source.image = image
     return tree
@@ -61,7 +85,8 @@ def wire(scene: bpy.types.Scene, group: Any) -> Any:
     """Put the node group into the scene's compositor, seen through the viewer; return its node.
 
     What the compositor puts out stays what it was: an artist's tree gains the node, and a viewer
-    if it had none; a scene without a compositor gets one that passes its render on.
+    if it had none; a scene without a compositor gets one that passes its render on. A tree linked
+    from a library is left alone (-> None): the plate's node group can be added where it is made.
     """
     tree = scene.compositing_node_group
     if tree is None:
@@ -73,6 +98,8 @@ def wire(scene: bpy.types.Scene, group: Any) -> Any:
         out.location = (500, 0)
         tree.links.new(render.outputs["Image"], out.inputs["Image"])
         scene.compositing_node_group = tree
+    if not tree.is_editable:
+        return None  # a library's: an edit of it would be gone with the next save
     node = next(
         (n for n in tree.nodes if n.bl_idname == "CompositorNodeGroup" and n.node_tree == group),
         None,
@@ -81,7 +108,7 @@ def wire(scene: bpy.types.Scene, group: Any) -> Any:
         below = min((n.location.y - max(n.height, 200) for n in tree.nodes), default=0.0)
         node = tree.nodes.new("CompositorNodeGroup")
         node.node_tree = group
-        node.label = GROUP
+        node.label = group.name
         node.width = 200
         node.location = (0, below - 40)
         if not any(n.bl_idname == "CompositorNodeViewer" for n in tree.nodes):

@@ -16,7 +16,8 @@ from ...core.region import Region
 from ...core.relight import over
 from ...core.relight import relight as relight_field
 from ..shot import paths
-from ..shot.shot import check_same_shot
+from ..shot.shot import check_same_shot, layer_of
+from ..shot.status import changed_since
 from ..work import Progress, Steps
 from ..world.background import background
 from ..world.bake import bake
@@ -38,18 +39,37 @@ def lamp_samples(scene: bpy.types.Scene, share: float) -> int:
     return max(LEAST_SAMPLES, math.ceil(scene.arto.lamp_samples * share))
 
 
-def relight(scene: bpy.types.Scene) -> Steps:
+def relight(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
+    """Relight the scene's field with its world and show it: `compute`, then `plate.present`.
+
+    Raises what `compute` raises; nothing of the scene changes but the plate's image and its node in
+    the compositor.
+    """
+    path, seconds = yield from compute(scene, view_layer)
+    plate.present(scene, path)
+    return path, seconds
+
+
+def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     """Relight the scene's field with its world; returns (path of the EXR, seconds by part).
 
-    Raises SceneError, CaptureSetError (of another shot), FieldError, EnvironmentMapError, ExrError,
-    CancelledError; nothing of the scene changes but the image `ARTO Relit` and its node in the
-    compositor.
+    Raises SceneError, CaptureSetError (of another shot), ShotError (another's), FieldError,
+    EnvironmentMapError, ExrError, CancelledError; nothing of the scene changes.
     """
     check_world(scene)
+    layer = view_layer or layer_of(scene)
+    scene.view_layers[layer].update()
     settings = scene.arto
     path = paths.relit_file(scene)
-    field = Field(paths.field_folder(scene))
-    check_same_shot(scene, field.about, "the reflectance field")
+    folder = paths.field_folder(scene, layer)
+    if not folder.exists() and not paths.capture_folder(scene, layer).exists():
+        check_same_shot(scene, paths.nearest(scene, layer), "the reflectance field", layer)
+    field = Field(folder)
+    check_same_shot(scene, field.about.get("shot"), "the reflectance field", layer)
+    changed = changed_since(scene, layer, field.about, now=True)
+    if changed:
+        # allowed: it is the artist who knows whether it shows
+        yield Progress(0.0, f"the scene is not the captured one: {'; '.join(changed[:3])}")
     seconds: dict[str, float] = {}
     last = time.perf_counter()
 
@@ -112,8 +132,8 @@ def relight(scene: bpy.types.Scene) -> Steps:
     yield Progress(0.9, f"writing {path}")
     world = scene.world.name if scene.world else ""
     about = {"scene": scene.name, "world": world, "denoised": denoised, "lamps": lamps}
-    plate.write(path, picture, about)
-    plate.wire(scene, plate.node_group(plate.show(path)))
+    about |= {"look": settings.look, "changed since capture": "; ".join(changed)}
+    plate.write(path, picture, {name: text for name, text in about.items() if text})
     lap("write")
     say = f" (denoised: {denoised})" if settings.denoise else ""
     yield Progress(1.0, f"wrote {path}{say}")

@@ -1,52 +1,300 @@
-"""Where things are kept."""
+"""Where what belongs to a shot is kept.
+
+`//arto/<file>/<scene>/<camera>_<frame>/` holds `shot.json`, the capture set in `capture`, the
+field in `field`, and captures that were stopped in `unfinished-...`. Names lead to a folder; whose
+it is, its `shot.json` says. So a renamed scene, file or camera finds its folder by the scene's ID,
+another's folder of the same name is left alone, and a copy of a file does not write into the
+folder of the file it was copied from.
+"""
 
 from __future__ import annotations
 
+import json
+import os
 import re
+import shutil
+import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
 
-from ...core.errors import SceneError
+from ...core.capture_set import HEADER as CAPTURE_HEADER
+from ...core.errors import ArtoError, SceneError, ShotError
+from ...core.field import HEADER as FIELD_HEADER
+from ...core.files import settle, write_text
+from ...core.shot import Shot, safe_name, short_hash
+from . import home
+from . import scene_id as scene_ids
+from .shot import shot_of
+
+HEADER = "shot.json"
+# Endings that an output may have by habit: what is written is EXR.
+_PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr"}
+_SECONDS = 1.0  # for which a panel need not look at the disk again
+_found: dict[tuple[Path, Shot, str], tuple[float, Place]] = {}
 
 
-def absolute(path: str) -> Path:
-    """A path of the artist's, made absolute. Raises SceneError where it hangs on a .blend that
-    was never saved."""
-    if path.startswith("//") and not bpy.data.filepath:
-        raise SceneError(
-            "this .blend was never saved, so its files have no place to go: save it, or set "
-            "ARTO's folder and output to absolute paths"
-        )
-    return Path(bpy.path.abspath(path))
+@dataclass(frozen=True)
+class Place:
+    """Where a shot's files are.
+
+    folder: its own, to write to; source: where what is there already is read from, mostly the
+    same; owner: whose that is where it is another file's or scene's, in words, and must be asked
+    for (`adopt`); earlier: whether it was written by the version before, which named no shots.
+    """
+
+    folder: Path
+    source: Path
+    owner: str = ""
+    earlier: bool = False
+
+    @property
+    def readable(self) -> Path:
+        """Where to read from. Raises ShotError where that is another's."""
+        if self.owner:
+            raise ShotError(
+                f"what is there was captured for {self.owner}: press Use It There in ARTO's panel "
+                "(or --command arto adopt) to work with it here, or capture this shot"
+            )
+        return self.source
 
 
-def root(scene: bpy.types.Scene) -> Path:
-    name = re.sub(r"[^\w .-]", "_", scene.name)
-    return absolute(scene.arto.folder) / name
+def _root(scene: bpy.types.Scene) -> Path:
+    return home.absolute(scene.arto.folder)
 
 
-def capture_folder(scene: bpy.types.Scene) -> Path:
-    return root(scene) / "capture"
+def _shot_in(folder: Path) -> tuple[Shot, str] | None:
+    """The shot whose folder this is and the .blend it was captured from, as seen from the root."""
+    path = folder / HEADER
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        return Shot.from_json(data["shot"]), str(data.get("blend", ""))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, TypeError, RecursionError, ArtoError):
+        # a folder whose shot cannot be read is nobody's: it is passed by, not written into
+        return Shot("", 0, 0, 0, (), (), scene_id="damaged"), ""
 
 
-def unfinished_capture_folder(scene: bpy.types.Scene) -> Path:
+def _is_ours(shot: Shot, there: Shot) -> bool:
+    """Whether a folder that the shot's names lead to is the shot's own."""
+    if shot.scene_id is None:
+        # not captured yet in this session, or never saved since: the names must do
+        same_names = (shot.file, shot.scene) == (there.file, there.scene)
+        return bool(shot.file) and same_names and _with_id(shot, there.scene_id).is_place_of(there)
+    return shot.is_place_of(there)
+
+
+def _with_id(shot: Shot, scene_id: str | None) -> Shot:
+    return Shot.from_json({**shot.to_json(), "scene_id": scene_id})
+
+
+def _anything_in(folder: Path) -> bool:
+    heads = (folder / "capture" / CAPTURE_HEADER, folder / "field" / FIELD_HEADER)
+    return any(h.is_file() for h in heads) or any(folder.glob("unfinished-*/" + CAPTURE_HEADER))
+
+
+def _look(root: Path, shot: Shot, origin: bpy.types.Scene | None) -> Place:
+    named = root.joinpath(*shot.folders)
+    marked = named.with_name(f"{named.name}~{shot.mark}")
+    own: Path | None = None
+    for folder in (named, marked):
+        there = _shot_in(folder)
+        if there is None:
+            own = own or folder
+        elif _is_ours(shot, there[0]):
+            if _anything_in(folder):
+                return Place(folder, folder)
+            own = folder
+            break
+    if own is None:
+        own = marked.with_name(f"{marked.name}-{os.urandom(3).hex()}")
+    scene_id = origin.arto.scene_id if origin else shot.scene_id
+    if scene_id:
+        for header in sorted(root.glob(f"*/*/*/{HEADER}")):
+            there = _shot_in(header.parent)
+            if there is None or not _anything_in(header.parent):
+                continue
+            was, blend = there
+            if not _with_id(shot, scene_id).is_place_of(was):
+                continue
+            if blend and was.file != shot.file and (root / blend).is_file():
+                return Place(own, header.parent, f"the file '{Path(blend).name}'")
+            if origin:
+                return Place(own, header.parent, f"the scene '{origin.name}'")
+            # the file, the scene or the camera has another name now
+            return Place(header.parent, header.parent)
+    earlier = root / re.sub(r"[^\w .-]", "_", shot.scene)
+    if any((earlier / n / h).is_file() for n, h in _HEADERS):
+        return Place(own, earlier, earlier=True)
+    return Place(own, own)
+
+
+_HEADERS = (("capture", CAPTURE_HEADER), ("field", FIELD_HEADER))
+
+
+def place(scene: bpy.types.Scene, view_layer: str | None = None, fresh: bool = True) -> Place:
+    """Where the files of the scene's shot are.
+
+    fresh: look at the disk, also where it was looked at a moment ago. Raises SceneError, OSError.
+    """
+    root, shot, origin = _root(scene), shot_of(scene, view_layer), scene_ids.copied_from(scene)
+    key = root, shot, origin.name if origin else ""
+    now = time.monotonic()
+    if fresh or key not in _found or now - _found[key][0] > _SECONDS:
+        if len(_found) > 100:
+            _found.clear()
+        _found[key] = now, _look(root, shot, origin)
+    return _found[key][1]
+
+
+def nearest(scene: bpy.types.Scene, view_layer: str | None = None) -> Shot | None:
+    """A shot of the same scene that something was captured of, for one that nothing was: of the
+    same camera or frame, if there is one. Raises SceneError, OSError."""
+    root, shot = _root(scene), shot_of(scene, view_layer)
+    found = []
+    for header in root.glob(f"*/*/*/{HEADER}"):
+        there = _shot_in(header.parent)
+        if there and shot.scene_id and there[0].scene_id == shot.scene_id:
+            then = there[0]
+            if _anything_in(header.parent) and then.difference(shot):
+                alike = (then.view_layer == shot.view_layer) + (then.camera == shot.camera)
+                found.append((-alike, abs(then.frame - shot.frame), header, then))
+    return min(found, key=lambda f: f[:3])[3] if found else None
+
+
+def shown(scene: bpy.types.Scene) -> str:
+    """The shot's folder for a panel, empty where there is none."""
+    try:
+        return str(place(scene, fresh=bpy.app.background).folder)
+    except (ArtoError, OSError):
+        return ""
+
+
+def capture_folder(scene: bpy.types.Scene, view_layer: str | None = None) -> Path:
+    """The capture set to read. Raises SceneError; ShotError where it is another's."""
+    return _settled(place(scene, view_layer).readable / "capture")
+
+
+def field_folder(scene: bpy.types.Scene, view_layer: str | None = None) -> Path:
+    """The field to read. Raises SceneError; ShotError where it is another's."""
+    return _settled(place(scene, view_layer).readable / "field")
+
+
+def _settled(folder: Path) -> Path:
+    """The folder, back at its name where a process was killed while it was being replaced."""
+    try:
+        settle(folder)
+    except OSError as e:
+        raise SceneError(f"{folder} cannot be put back ({e}): look at its permissions") from e
+    return folder
+
+
+def unfinished_folder(folder: Path, key: str) -> Path:
     """Where a capture grows. It takes the place of the finished one only when it is complete."""
-    return root(scene) / "capture.unfinished"
+    return folder / f"unfinished-{key[:8]}"
 
 
-def field_folder(scene: bpy.types.Scene) -> Path:
-    return root(scene) / "field"
+def claim(scene: bpy.types.Scene, view_layer: str) -> Path:
+    """The shot's own folder, made and marked as its own; for writing. Raises SceneError."""
+    root, folder = _root(scene), place(scene, view_layer).folder
+    there = _shot_in(folder)
+    if scene_ids.of(scene) is None:
+        # its names led here, or it is new
+        scene_ids.give(scene, there[0].scene_id if there else None)
+    shot, blend = shot_of(scene, view_layer), home.file()
+    try:
+        relative = os.path.relpath(blend, root) if blend else ""
+    except ValueError:  # another drive
+        relative = blend
+    about = {"shot": shot.to_json(), "blend": Path(relative).as_posix() if relative else ""}
+    text = json.dumps(about)
+    try:
+        path = folder / HEADER
+        if not path.is_file() or path.read_text(encoding="utf-8") != text:
+            write_text(path, text)
+    except OSError as e:
+        raise SceneError(
+            f"{folder} cannot be written ({e}): make room on the disk, or choose another folder "
+            "in ARTO's settings"
+        ) from e
+    _found.clear()
+    return folder
+
+
+def forget() -> None:
+    """Look at the disk again."""
+    _found.clear()
+
+
+def adopt(scene: bpy.types.Scene, view_layer: str, source: Path) -> Path:
+    """Take what is in `source` for this shot too; returns the shot's own folder.
+
+    The files are shared where the disk can, which costs nothing: they are never changed, only
+    replaced. Raises SceneError.
+    """
+    folder = claim(scene, view_layer)
+    for name in ("capture", "field"):
+        if (source / name).is_dir() and not (folder / name).exists():
+            partial = folder / f"{name}.part"
+            try:
+                _share(source / name, partial)
+                partial.rename(folder / name)
+            except OSError as e:
+                raise SceneError(f"{source / name} cannot be taken over ({e}): make room") from e
+    _found.clear()
+    return folder
+
+
+def _share(source: Path, target: Path) -> None:
+    def link(a: str, b: str) -> str:
+        try:
+            os.link(a, b)
+        except OSError:
+            shutil.copy2(a, b)
+        return b
+
+    if target.exists():
+        shutil.rmtree(target)
+    shutil.copytree(source, target, copy_function=link)
+
+
+def relit_name(scene: bpy.types.Scene, look: str | None = None) -> str:
+    """What tells this scene's plate from those of other scenes and looks, empty for the only one.
+
+    The image is then `ARTO <scene> <look>`, the file `<blend>_<scene>_<look>.exr`.
+    """
+    look = scene.arto.look.strip() if look is None else look
+    if not look and len(bpy.data.scenes) == 1:
+        return ""
+    name = f"{scene.name} {look}".strip()
+    others = [s.name for s in bpy.data.scenes if s != scene]
+    # 'A B' under the look C, 'A' under the look B C
+    if any(name.startswith(f"{other} ") for other in others) or look == _PLAIN:
+        name += f"~{short_hash(scene.name, look)}"
+    return name
+
+
+_PLAIN = "relit"  # a plate's ending without a look
 
 
 def relit_file(scene: bpy.types.Scene) -> Path:
+    """The plate's EXR. Raises SceneError for a .blend that was never saved."""
+    look, name = scene.arto.look.strip(), relit_name(scene)
+    mark = f"~{name.rpartition('~')[2]}" if "~" in name else ""
     if scene.arto.output:
-        path = absolute(scene.arto.output)
-        return path if path.suffix.lower() == ".exr" else path.with_suffix(".exr")
-    if not bpy.data.filepath:
+        path = home.absolute(scene.arto.output)
+        if path.suffix.lower() in _PICTURES:
+            path = path.with_suffix(".exr")
+        elif path.suffix.lower() != ".exr":  # a version or a dot of the name's own
+            path = path.with_name(path.name + ".exr")
+        return path.with_name(f"{path.stem}_{safe_name(look)}.exr") if look else path
+    if not home.file():
         raise SceneError(
             "this .blend was never saved, so the relit picture has no place to go: save it, or "
             "set ARTO's output to an absolute path"
         )
-    blend = Path(bpy.data.filepath)
-    return blend.with_name(f"{blend.stem}_relit.exr")
+    blend = Path(home.file())
+    parts = [safe_name(scene.name), safe_name(look or _PLAIN)] if name else [_PLAIN]
+    return blend.with_name("_".join([blend.stem, *parts]) + mark + ".exr")

@@ -1,49 +1,77 @@
-"""Which picture of which scene this is."""
+"""Which picture of which scene Blender is about to render: the core's `Shot` of a scene."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import bpy
 
 from ...core.errors import CaptureSetError
-from ..stage.stage import picture_size
+from ...core.region import Region
+from ...core.shot import Shot
+from ..stage.stage import picture_region, picture_size
+from . import home, scene_id
 
 
-def shot(scene: bpy.types.Scene) -> dict[str, Any]:
-    """What tells one shot from another: which picture of which scene this is."""
+def layer_of(scene: bpy.types.Scene) -> str:
+    """The view layer that the artist works in, or the scene's first."""
+    context = bpy.context
+    if getattr(context, "scene", None) == scene and getattr(context, "view_layer", None):
+        return context.view_layer.name
+    return scene.view_layers[0].name
+
+
+def shot_of(
+    scene: bpy.types.Scene, view_layer: str | None = None, region: Region | None = None
+) -> Shot:
+    """The scene's shot as it stands. Changes nothing, and evaluates nothing."""
     width, height = picture_size(scene)
     camera = scene.camera
-    return {
-        "scene": scene.name,
-        "frame": scene.frame_current,
-        "width": width,
-        "height": height,
-        "camera": [round(x, 5) for row in camera.matrix_world for x in row] if camera else [],
-        "lens": _lens(scene),
-    }
+    region = region or picture_region(scene)
+    return Shot(
+        scene=scene.name,
+        frame=scene.frame_current,
+        width=width,
+        height=height,
+        camera_matrix=_matrix(camera) if camera else (),
+        lens=_lens(scene),
+        file=Path(home.file()).stem,
+        scene_id=scene_id.of(scene),
+        view_layer=view_layer or layer_of(scene),
+        camera=camera.name if camera else "",
+        subframe=round(scene.frame_subframe, 5),
+        region=(region.x, region.y, region.width, region.height),
+        colour_space=bpy.data.colorspace.working_space,
+    )
 
 
-def _lens(scene: bpy.types.Scene) -> list[Any]:
+def _matrix(camera: bpy.types.Object) -> tuple[float, ...]:
+    return tuple(round(x, 5) for row in camera.matrix_world for x in row)
+
+
+def _lens(scene: bpy.types.Scene) -> tuple[Any, ...]:
     """What of the camera decides the framing, beside where it stands."""
     if not scene.camera or scene.camera.type != "CAMERA":
-        return []
+        return ()
     lens, render = scene.camera.data, scene.render
     kind = lens.type
     names = ["shift_x", "shift_y", "sensor_fit", "sensor_width", "sensor_height"]
     names += {"PERSP": ["lens"], "ORTHO": ["ortho_scale"]}.get(kind, ["panorama_type"])
     values = [getattr(lens, name) for name in names]
     values += [render.pixel_aspect_x, render.pixel_aspect_y]
-    return [kind, *(round(v, 5) if isinstance(v, float) else v for v in values)]
+    return kind, *(round(v, 5) if isinstance(v, float) else v for v in values)
 
 
-def check_same_shot(scene: bpy.types.Scene, head: dict[str, Any], what: str) -> None:
-    """Raise CaptureSetError where a capture set or field is of another shot than the scene's."""
-    now = shot(scene)
-    then = head.get("shot") or {}
-    for key in ("scene", "width", "height", "frame", "camera", "lens"):
-        if key in then and then[key] != now[key]:
-            shown = "" if key in ("camera", "lens") else f" ({then[key]}, now {now[key]})"
-            raise CaptureSetError(
-                f"{what} is of another {key}{shown}: set it back, or capture and fit again"
-            )
+def check_same_shot(scene: bpy.types.Scene, then: Any, what: str, view_layer: str) -> None:
+    """Raise CaptureSetError where `what` is of another shot than the scene's.
+
+    then: the description that it was written with, or that as a `Shot`. Raises ShotError for one
+    that is damaged.
+    """
+    if not then:
+        return
+    was = then if isinstance(then, Shot) else Shot.from_json(then)
+    difference = was.difference(shot_of(scene, view_layer))
+    if difference:
+        raise CaptureSetError(f"{what} is of {difference}: set it back, or capture and fit again")

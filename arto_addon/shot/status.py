@@ -1,7 +1,8 @@
-"""What is there of a shot, in a line, for the panel: its capture set, its reflectance field."""
+"""What there is of a shot, in a line, for the panel: its capture set, its reflectance field."""
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,16 @@ from ...core import capture_set, field
 from ...core.capture_set import CaptureSet
 from ...core.errors import ArtoError
 from ...core.field import Field
-from . import paths
-from .shot import check_same_shot
+from ...core.shot import Shot
+from . import paths, watch
+from .fingerprint import changes
+from .paths import Place
+from .shot import check_same_shot, layer_of
 
 # A panel is drawn with every move of the mouse; a description is read when it has changed.
 _read: dict[Path, tuple[int, CaptureSet | Field | None]] = {}
+
+Line = tuple[str, bool]  # what to say, and whether it serves the shot as it is
 
 
 def _opened(kind: type, path: Path, **options: Any) -> Any:
@@ -33,47 +39,131 @@ def _opened(kind: type, path: Path, **options: Any) -> Any:
     return _read[path][1]
 
 
-def capture_line(scene: bpy.types.Scene) -> tuple[str, bool] | None:
-    """What there is of a capture, and whether it serves the shot as it is; None for nothing."""
+def _place(scene: bpy.types.Scene, view_layer: str | None) -> Place | None:
     try:
-        path = paths.capture_folder(scene) / capture_set.HEADER
-        if not path.is_file():
-            path = paths.unfinished_capture_folder(scene) / capture_set.HEADER
-        there: CaptureSet | None = _opened(CaptureSet, path, unfinished=True)
+        return paths.place(scene, view_layer, fresh=bpy.app.background)
     except (ArtoError, OSError):
         return None
-    if there is None:
-        return "damaged, or of another version: capture again", False
-    tiles = there.head["tiles"]
-    done = sum(t["done"] for t in tiles)
-    if done < len(tiles):
+
+
+def is_of_another(scene: bpy.types.Scene, view_layer: str | None = None) -> bool:
+    """Whether what is there was captured for another file or scene."""
+    place = _place(scene, view_layer)
+    return bool(place and place.owner)
+
+
+def unfinished(folder: Path) -> list[str]:
+    """The captures in a shot's folder that were stopped, the newest first: `2 of 7 tiles, ...`."""
+    found = []
+    for path in folder.glob("unfinished-*/" + capture_set.HEADER):
+        try:
+            there = _opened(CaptureSet, path, unfinished=True)
+        except OSError:
+            continue
+        if there:
+            tiles = there.head["tiles"]
+            done = sum(bool(t["done"]) for t in tiles)
+            text = f"{done} of {len(tiles)} tiles, {there.head.get('samples')} samples"
+            found.append((path.stat().st_mtime_ns, text))
+    return [text for _, text in sorted(found, reverse=True)]
+
+
+def capture_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line | None:
+    """What there is of a capture, and whether it serves the shot as it is; None for nothing."""
+    place = _place(scene, view_layer)
+    if place is None:
+        return None
+    if place.owner:
+        return f"captured for {place.owner}", False
+    there = _capture_set(place)
+    if isinstance(there, tuple):
+        return there
+    stopped = unfinished(place.source)
+    if there is None and stopped:
         # whether Capture goes on with it hangs on every setting
-        return f"unfinished, {done} of {len(tiles)} tiles", False
+        return f"unfinished, {stopped[0]}", False
+    if there is None:
+        other = _nearest(scene, view_layer, place)
+        return _of_this_shot(scene, view_layer, {"shot": other}, "") if other else None
     text = f"{len(there.hemicube)} patches, {there.head.get('samples')} samples"
-    return _of_this_shot(scene, there.head, text)
+    return _of_this_shot(scene, view_layer, there.head, text)
 
 
-def field_line(scene: bpy.types.Scene) -> tuple[str, bool] | None:
-    """What there is of a field, and whether it serves the shot as it is; None for nothing."""
+# By the shot's own folder, for a panel that is drawn often: when it was looked for, and found.
+_others: dict[Path, tuple[float, Shot | None]] = {}
+
+
+def _nearest(scene: bpy.types.Scene, view_layer: str | None, place: Place) -> Shot | None:
+    """Another shot of the scene, where nothing was captured of this one."""
+    at, found = _others.get(place.folder, (-2.0, None))
+    if bpy.app.background or time.monotonic() - at > 1:
+        found = paths.nearest(scene, view_layer)
+        _others[place.folder] = time.monotonic(), found
+    return found
+
+
+def unfinished_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line | None:
+    """What was stopped beside a capture set that is there; None for nothing."""
+    place = _place(scene, view_layer)
+    if place is None or place.owner or _capture_set(place) is None:
+        return None
+    stopped = unfinished(place.source)
+    return (f"and unfinished: {'; '.join(stopped)}", False) if stopped else None
+
+
+def _capture_set(place: Place) -> CaptureSet | Line | None:
     try:
-        path = paths.field_folder(scene) / field.HEADER
+        there = _opened(CaptureSet, place.source / "capture" / capture_set.HEADER, unfinished=True)
+    except OSError:
+        return None
+    return there or ("damaged, or of another version: capture again", False)
+
+
+def field_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line | None:
+    """What there is of a field, and whether it serves the shot as it is; None for nothing."""
+    place = _place(scene, view_layer)
+    if place is None or place.owner:
+        return None
+    try:
+        path = place.source / "field" / field.HEADER
         there: Field | None = _opened(Field, path)
-        captured = paths.capture_folder(scene) / capture_set.HEADER
-        # a field needs no capture set any more
-        older = captured.is_file() and path.stat().st_mtime_ns < captured.stat().st_mtime_ns
-    except (ArtoError, OSError):
+    except OSError:
         return None
     if there is None:
         return "damaged, or of another version: fit again", False
-    if older:
-        return "of an earlier capture: fit again", False
+    captured = _capture_set(place)  # which a field does not need any more
+    if isinstance(captured, CaptureSet):
+        keys = there.about.get("key"), captured.head.get("key")
+        if keys[0] != keys[1]:
+            return "of an earlier capture: fit again", False
     text = f"{len(there.hemicube)} patches, {there.about.get('choice')}"
-    return _of_this_shot(scene, there.about, text)
+    return _of_this_shot(scene, view_layer, there.about, text)
 
 
-def _of_this_shot(scene: bpy.types.Scene, head: dict[str, Any], text: str) -> tuple[str, bool]:
+def _of_this_shot(
+    scene: bpy.types.Scene, view_layer: str | None, head: dict[str, Any], text: str
+) -> Line:
+    layer = view_layer or layer_of(scene)
     try:
-        check_same_shot(scene, head, "it")
+        check_same_shot(scene, head.get("shot"), "it", layer)
     except ArtoError as e:
         return str(e).removeprefix("it ").split(":")[0] + ": capture again", False
+    changed = changed_since(scene, layer, head)
+    if changed:
+        more = f" (and {len(changed) - 1} more)" if len(changed) > 1 else ""
+        return f"{changed[0]}{more}", False
     return text, True
+
+
+def changed_since(
+    scene: bpy.types.Scene, view_layer: str, head: dict[str, Any], now: bool = False
+) -> list[str]:
+    """What of the scene has changed since a capture, in words, the most telling first.
+
+    now: look now; else, in the window, it is what was found after the last change.
+    """
+    then = head.get("fingerprint")
+    if not isinstance(then, dict):
+        return []
+    found = watch.latest(scene, view_layer, then, now or bpy.app.background)
+    return changes(then, found) if found is not None else []

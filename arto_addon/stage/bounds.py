@@ -12,6 +12,7 @@ from mathutils import Vector
 from numpy.typing import NDArray
 
 from ...core.errors import SceneError
+from ..work import last_properties_kept
 from .stage import Stage
 
 _found: list[tuple[NDArray, NDArray]] = []
@@ -78,7 +79,8 @@ def scene_bounds(stage: Stage) -> tuple[tuple[float, float, float], float]:
     try:
         for name, value in settings.items():
             setattr(render, name, value)
-        bpy.ops.render.render(scene=scene.name)
+        with last_properties_kept():
+            bpy.ops.render.render(scene=scene.name)
         for name, value in before.items():
             setattr(render, name, value)
     finally:

@@ -97,6 +97,19 @@ def picture_size(scene: bpy.types.Scene) -> tuple[int, int]:
     return r.resolution_x * share // 100, r.resolution_y * share // 100
 
 
+def picture_region(scene: bpy.types.Scene) -> Region:
+    """What the scene renders of its picture: all of it, or the artist's render region."""
+    width, height = picture_size(scene)
+    r = scene.render
+    if not r.use_border:
+        return Region(0, 0, width, height)
+    x0, x1 = int(r.border_min_x * width + 0.5), int(r.border_max_x * width + 0.5)
+    y0, y1 = int(r.border_min_y * height + 0.5), int(r.border_max_y * height + 0.5)
+    if x1 <= x0 or y1 <= y0:
+        raise SceneError("the render region is empty: draw it again, or turn it off")
+    return Region(x0, height - y1, x1 - x0, y1 - y0)
+
+
 def set_region(scene: bpy.types.Scene, region: Region) -> None:
     """Make the scene render just this region, cropped."""
     width, height = picture_size(scene)

@@ -9,14 +9,14 @@ from typing import Any
 
 import bpy
 
-from ...core.choice import CHOICES
 from ...core.errors import ArtoError, CancelledError
-from ...core.hemicube import FACE_NAMES, PRESETS
-from ...core.patterns import PATTERN_SETS
 from ..capture.capture import capture
 from ..fit import fit
+from ..job import run as job
 from ..relight.relight import relight
+from ..shot import paths
 from ..work import ProgressLines, run
+from . import properties
 
 _commands: list[Any] = []
 
@@ -30,38 +30,35 @@ def _parser() -> argparse.ArgumentParser:
     jobs = parser.add_subparsers(dest="job", required=True)
     files = argparse.ArgumentParser(add_help=False)
     files.add_argument("--scene", help="name of the scene (default: the .blend's)")
+    files.add_argument("--view-layer", help="name of the view layer (default: the scene's)")
     files.add_argument("--folder", help="where capture set and field are kept (default: //arto/)")
-
-    job = jobs.add_parser("capture", parents=[files], help="render the basis images")
-    job.add_argument("--preset", choices=sorted(PRESETS))
-    job.add_argument("--faces", nargs="+", choices=FACE_NAMES)
-    job.add_argument("--patches", type=int, help="patches a side, 1 to 16")
-    adaptive = "patches of the size that the scene needs"
-    job.add_argument(
-        "--adaptive", action=argparse.BooleanOptionalAction, default=None, help=adaptive
-    )
-    job.add_argument("--patterns", choices=sorted(PATTERN_SETS))
-    job.add_argument("--route", choices=("all", "pattern", "single"), help="how many renders")
-    job.add_argument("--samples", type=int)
-    job.add_argument("--seed", type=int)
-    job.add_argument("--memory", type=int, help="megabytes for the passes of one render")
-
-    job = jobs.add_parser("fit", parents=[files], help="fit the reflectance field")
-    job.add_argument("--support", choices=CHOICES)
-    separate = "a support for each channel"
-    job.add_argument(
-        "--separate", action=argparse.BooleanOptionalAction, default=None, help=separate
-    )
-
-    job = jobs.add_parser("relight", parents=[files], help="relight with the scene's world")
-    job.add_argument("--own-lamps", type=float, help="how much of the scene's own lamps to add")
-    lamps = "a render of their own for the suns and lamps of the world"
-    job.add_argument("--lamps", action=argparse.BooleanOptionalAction, default=None, help=lamps)
-    job.add_argument("--lamp-samples", type=int)
-    job.add_argument("--environment-width", type=int)
-    job.add_argument("--denoise", action=argparse.BooleanOptionalAction, default=None)
-    job.add_argument("--output", help="the EXR to write (default: beside the .blend)")
+    for name, text, settings in (
+        ("capture", "render the basis images", (*properties.HEMICUBE, *properties.CAPTURE)),
+        ("fit", "fit the reflectance field", properties.FIT),
+        ("relight", "relight with the scene's world", properties.RELIGHT),
+        ("adopt", "use what was captured for another file or scene", ()),
+    ):
+        one = jobs.add_parser(name, parents=[files], help=text)
+        for setting in settings:
+            _add_option(one, setting)
+    # what the window starts
+    jobs.add_parser("job").add_argument("task", type=Path)
     return parser
+
+
+def _add_option(parser: argparse.ArgumentParser, name: str) -> None:
+    """An option for a setting, as the setting describes itself."""
+    prop = properties.ArtoSettings.bl_rna.properties[name]
+    option: dict[str, Any] = {"default": None, "help": prop.description.replace("%", "%%")}
+    if prop.type == "ENUM":
+        option["choices"] = [item.identifier for item in prop.enum_items]
+        if prop.is_enum_flag:
+            option["nargs"] = "+"
+    elif prop.type == "BOOLEAN":
+        option["action"] = argparse.BooleanOptionalAction
+    else:
+        option["type"] = {"INT": int, "FLOAT": float, "STRING": str}[prop.type]
+    parser.add_argument(f"--{name.replace('_', '-')}", **option)
 
 
 def main(arguments: list[str]) -> int:
@@ -70,14 +67,21 @@ def main(arguments: list[str]) -> int:
         options = vars(_parser().parse_args(arguments))
     except SystemExit as e:
         return int(e.code or 0)
-    job, name = options.pop("job"), options.pop("scene")
+    verb = options.pop("job")
+    if verb == "job":
+        return job.main(options["task"])
+    name, layer = options.pop("scene"), options.pop("view_layer")
     scene = bpy.data.scenes.get(name) if name else bpy.context.scene
     if scene is None:
         print(f"ARTO: there is no scene '{name}'", file=sys.stderr)
         return 2
-    layer = scene.view_layers[0].name
-    if scene == bpy.context.scene:
-        layer = bpy.context.view_layer.name
+    if layer is None:
+        layer = scene.view_layers[0].name
+        if scene == bpy.context.scene:
+            layer = bpy.context.view_layer.name
+    elif layer not in scene.view_layers:
+        print(f"ARTO: the scene has no view layer '{layer}'", file=sys.stderr)
+        return 2
     for path in ("folder", "output"):
         given = options.get(path)
         if given and not given.startswith("//"):
@@ -93,13 +97,16 @@ def main(arguments: list[str]) -> int:
                 option = key.replace("_", "-")
                 print(f"ARTO: --{option} {value} is out of range", file=sys.stderr)
                 return 2
-    steps = {
-        "capture": lambda: capture(scene, layer),
-        "fit": lambda: fit(scene),
-        "relight": lambda: relight(scene),
-    }[job]
     try:
-        run(steps(), ProgressLines(job))
+        if verb == "adopt":
+            place = paths.place(scene, layer)
+            if not place.owner:
+                print("ARTO: there is nothing of another file or scene to use", file=sys.stderr)
+                return 1
+            print(f"ARTO adopt: {paths.adopt(scene, layer, place.source)}")
+            return 0
+        work = {"capture": capture, "fit": fit, "relight": relight}[verb]
+        run(work(scene, layer), ProgressLines(verb))
     except CancelledError as e:
         print(f"ARTO: {e}", file=sys.stderr)
         return 130

@@ -1,23 +1,35 @@
-"""The operators: build and remove the hemicube, capture, fit, relight."""
+"""The operators: the hemicube, capture, fit, relight, and what belongs to a shot."""
 
 from __future__ import annotations
 
-import time
+import shutil
 
 import bpy
 
-from ...core.errors import ArtoError, CancelledError
+from ...core.capture_set import HEADER as CAPTURE_HEADER
+from ...core.errors import ArtoError, SceneError
+from ...core.field import HEADER as FIELD_HEADER
+from ...core.files import Lock
 from ..capture import planes
 from ..capture.capture import capture
+from ..capture.check import check_scene
 from ..fit import fit
+from ..job import session
 from ..relight.relight import relight
 from ..shot import paths
+from ..shot.shot import layer_of
 from ..stage.bounds import scene_bounds
 from ..stage.stage import stage
-from ..work import Progress, ProgressLines, Render, Steps, run
+from ..work import Steps
+from ..world.check import check_world
+from .long_work import LongWork
 
-# Steps are taken for this long before the window is drawn again.
-SECONDS_A_TICK = 0.1
+
+def _free(cls: type) -> bool:
+    """Whether nothing of ARTO's runs; a button that has to wait says what for."""
+    if text := session.busy():
+        cls.poll_message_set(text)
+    return not text
 
 
 class _Quick(bpy.types.Operator):
@@ -43,6 +55,13 @@ capturing uses its geometry"""
     bl_label = "Build Hemicube"
     bl_options = {"REGISTER", "UNDO"}
 
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if bpy.app.is_job_running("RENDER"):
+            cls.poll_message_set("Blender is rendering: wait until it is done")
+            return False
+        return _free(cls)
+
     def work(self, context: bpy.types.Context) -> str:
         scene = context.scene
         with stage(scene, context.view_layer.name) as on:
@@ -67,118 +86,19 @@ class ARTO_OT_remove_hemicube(_Quick):
         if planes.of_artist(context.scene) is None:
             cls.poll_message_set("There is no hemicube in this scene")
             return False
-        return True
+        return _free(cls)
 
     def work(self, context: bpy.types.Context) -> str:
         planes.remove_for_artist(context.scene)
         return "removed the hemicube"
 
 
-class _Work(bpy.types.Operator):
-    """An operator over long work: blocking from Python and in batch, by steps behind a button."""
-
-    _timer = None
-    _steps: Steps | None = None
-    _waiting: Render | None = None
-    _display = ""
-
-    def steps(self, context: bpy.types.Context) -> Steps:
-        raise NotImplementedError
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        lines = ProgressLines(self.bl_label.lower())
-        try:
-            run(self.steps(context), lines)
-        except CancelledError as e:
-            # from Python that is an error too: whoever waits for the result must not go on
-            self.report({"ERROR"}, str(e))
-            return {"CANCELLED"}
-        except ArtoError as e:
-            self.report({"ERROR"}, str(e))
-            return {"CANCELLED"}
-        return {"FINISHED"}
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if bpy.app.background:
-            return self.execute(context)
-        self._steps = self.steps(context)
-        self._waiting = None
-        view = context.preferences.view
-        # no window of its own for each tile
-        self._display, view.render_display_type = view.render_display_type, "NONE"
-        bpy.app.handlers.render_complete.append(self._on_complete)
-        bpy.app.handlers.render_cancel.append(self._on_cancel)
-        self._timer = context.window_manager.event_timer_add(0.05, window=context.window)
-        context.window_manager.progress_begin(0, 100)
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def _on_complete(self, *_: object) -> None:
-        if self._waiting:
-            self._waiting.state = "done"
-
-    def _on_cancel(self, *_: object) -> None:
-        if self._waiting:
-            self._waiting.state = "cancelled"
-
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if event.type == "ESC" and not bpy.app.is_job_running("RENDER"):
-            return self._quit(context, "WARNING", "cancelled")
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"}
-        if self._waiting and (self._waiting.state == "waiting" or bpy.app.is_job_running("RENDER")):
-            return {"PASS_THROUGH"}
-        self._waiting = None
-        until = time.perf_counter() + SECONDS_A_TICK
-        try:
-            step = next(self._steps)
-            while not isinstance(step, Render) and time.perf_counter() < until:
-                self._last = step.text
-                step = next(self._steps)
-        except StopIteration:
-            return self._quit(context, "INFO", self._last)
-        except CancelledError as e:
-            return self._quit(context, "WARNING", str(e))
-        except ArtoError as e:
-            return self._quit(context, "ERROR", str(e))
-        except BaseException:
-            self._quit(context, "ERROR", f"{self.bl_label} failed: see the console")
-            raise
-        self._show(context, step)
-        if isinstance(step, Render):
-            self._waiting = step
-            bpy.ops.render.render("INVOKE_DEFAULT", write_still=True, scene=step.scene)
-        return {"RUNNING_MODAL"}
-
-    _last = ""
-
-    def _show(self, context: bpy.types.Context, step: Progress | Render) -> None:
-        self._last = step.text
-        context.window_manager.progress_update(int(step.share * 100))
-        context.workspace.status_text_set(
-            f"ARTO {self.bl_label}: {step.share:.0%} {step.text}   (ESC: cancel)"
-        )
-
-    def _quit(self, context: bpy.types.Context, level: str, text: str) -> set[str]:
-        """The only way out of the modal work."""
-        self._steps.close()
-        bpy.app.handlers.render_complete.remove(self._on_complete)
-        bpy.app.handlers.render_cancel.remove(self._on_cancel)
-        context.window_manager.event_timer_remove(self._timer)
-        context.window_manager.progress_end()
-        context.workspace.status_text_set(None)
-        context.preferences.view.render_display_type = self._display
-        self.report({level}, text)
-        for area in context.screen.areas:
-            area.tag_redraw()
-        return {"FINISHED"} if level == "INFO" else {"CANCELLED"}
-
-
-class ARTO_OT_capture(_Work):
+class ARTO_OT_capture(LongWork):
     """Render how the scene answers light from every patch, with Cycles"""
 
     bl_idname = "arto.capture"
     bl_label = "Capture"
+    verb = "capture"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -188,52 +108,129 @@ class ARTO_OT_capture(_Work):
         if context.scene.camera is None:
             cls.poll_message_set("The scene has no camera")
             return False
-        return True
+        return _free(cls)
 
-    def steps(self, context: bpy.types.Context) -> Steps:
-        return capture(context.scene, context.view_layer.name)
+    def check(self, scene: bpy.types.Scene) -> None:
+        check_scene(scene)
+
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
+        return capture(scene, view_layer)
 
 
-class ARTO_OT_fit(_Work):
+class ARTO_OT_fit(LongWork):
     """Fit the captured images as a reflectance field"""
 
     bl_idname = "arto.fit"
     bl_label = "Fit"
+    verb = "fit"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _there(cls, context, paths.capture_folder, "capture.json", "Capture the scene first")
+        return _free(cls) and _there(
+            cls, context, "capture", CAPTURE_HEADER, "Capture the scene first"
+        )
 
-    def steps(self, context: bpy.types.Context) -> Steps:
-        return fit(context.scene)
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
+        return fit(scene, view_layer)
 
 
-class ARTO_OT_relight(_Work):
+class ARTO_OT_relight(LongWork):
     """Show the captured scene in the light of its world, as an image in the compositor"""
 
     bl_idname = "arto.relight"
     bl_label = "Relight"
+    verb = "relight"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if context.scene.world is None:
             cls.poll_message_set("The scene has no world to relight with: add one with an HDRI")
             return False
-        return _there(cls, context, paths.field_folder, "field.json", "Fit the capture first")
+        return _free(cls) and _there(cls, context, "field", FIELD_HEADER, "Fit the capture first")
 
-    def steps(self, context: bpy.types.Context) -> Steps:
-        return relight(context.scene)
+    def check(self, scene: bpy.types.Scene) -> None:
+        check_world(scene)
+        paths.relit_file(scene)
+
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
+        return relight(scene, view_layer)
 
 
-def _there(cls: type, context: bpy.types.Context, folder: object, name: str, say: str) -> bool:
-    """Whether a file of the scene's is on disk; else say what to do first."""
+def _there(cls: type, context: bpy.types.Context, folder: str, name: str, say: str) -> bool:
+    """Whether a file of the shot's is on disk; else say what to do first."""
+    scene = context.scene
     try:
-        there = (folder(context.scene) / name).is_file()
-    except ArtoError as e:
+        place = paths.place(scene, layer_of(scene), fresh=bpy.app.background)
+        there = (place.readable / folder / name).is_file()
+    except (ArtoError, OSError) as e:
         there, say = False, str(e)
     if not there:
         cls.poll_message_set(say[0].upper() + say[1:])
     return there
+
+
+class ARTO_OT_cancel(_Quick):
+    """End what ARTO is doing; finished tiles are kept"""
+
+    bl_idname = "arto.cancel"
+    bl_label = "Cancel"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return session.current is not None
+
+    def work(self, context: bpy.types.Context) -> str:
+        session.cancel()
+        return "ARTO is stopping"
+
+
+class ARTO_OT_adopt(_Quick):
+    """Work with what was captured for another file or scene; it is kept for that one too"""
+
+    bl_idname = "arto.adopt"
+    bl_label = "Use It Here"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _free(cls)
+
+    def work(self, context: bpy.types.Context) -> str:
+        scene, layer = context.scene, layer_of(context.scene)
+        place = paths.place(scene, layer)
+        if not place.owner:
+            raise SceneError("there is nothing of another file or scene to use here")
+        folder = paths.adopt(scene, layer, place.source)
+        return f"what was captured for {place.owner} is used here too, in {folder}"
+
+
+class ARTO_OT_discard_unfinished(_Quick):
+    """Remove the captures of this shot that were stopped, with their finished tiles"""
+
+    bl_idname = "arto.discard_unfinished"
+    bl_label = "Discard Unfinished"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _free(cls)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return context.window_manager.invoke_confirm(self, event)
+
+    def work(self, context: bpy.types.Context) -> str:
+        place = paths.place(context.scene, layer_of(context.scene))
+        if place.owner:
+            raise SceneError(f"what is there is of {place.owner}")
+        gone = 0
+        with Lock(place.folder, "discarding"):
+            for folder in place.folder.glob("unfinished-*"):
+                try:
+                    shutil.rmtree(folder)
+                except OSError as e:
+                    raise SceneError(f"{folder} cannot be removed ({e})") from e
+                gone += 1
+        paths.forget()
+        return f"removed {gone} unfinished captures" if gone else "there is none unfinished"
 
 
 CLASSES = (
@@ -242,4 +239,7 @@ CLASSES = (
     ARTO_OT_capture,
     ARTO_OT_fit,
     ARTO_OT_relight,
+    ARTO_OT_cancel,
+    ARTO_OT_adopt,
+    ARTO_OT_discard_unfinished,
 )

@@ -6,14 +6,22 @@ import bpy
 
 from ...core.hemicube import SIDES
 from ..capture import planes
-from ..shot import status
+from ..job import session
+from ..shot import paths, status
+from ..shot.status import Line
+from . import properties
 
 
-def _line(column: bpy.types.UILayout, found: tuple[str, bool] | None) -> None:
+def _line(column: bpy.types.UILayout, found: Line | None) -> None:
     """What is there already, below the button that makes it."""
     if found:
         text, serves = found
         column.label(text=text, icon="CHECKMARK" if serves else "ERROR")
+
+
+def _settings(column: bpy.types.UILayout, settings: bpy.types.PropertyGroup, *names: str) -> None:
+    for name in names:
+        column.prop(settings, name)
 
 
 class _Panel:
@@ -21,16 +29,19 @@ class _Panel:
     bl_region_type = "WINDOW"
     bl_context = "render"
 
+    def column(self) -> bpy.types.UILayout:
+        column = self.layout.column()
+        column.use_property_split = True
+        column.use_property_decorate = False
+        return column
+
 
 class ARTO_PT_main(_Panel, bpy.types.Panel):
     bl_label = "ARTO Relighting"
     bl_idname = "ARTO_PT_main"
 
     def draw(self, context: bpy.types.Context) -> None:
-        column = self.layout.column()
-        column.use_property_split = True
-        column.use_property_decorate = False
-        settings = context.scene.arto
+        column, settings = self.column(), context.scene.arto
         there = planes.built(context.scene)
         row = column.row(align=True)
         row.operator("arto.build_hemicube", icon="MESH_CUBE")
@@ -43,19 +54,36 @@ class ARTO_PT_main(_Panel, bpy.types.Panel):
         column.prop(settings, "samples")
         column.operator("arto.capture", icon="RENDER_STILL")
         _line(column, status.capture_line(context.scene))
+        if stopped := status.unfinished_line(context.scene):
+            row = column.row(align=True)
+            _line(row, stopped)
+            row.operator("arto.discard_unfinished", text="", icon="TRASH")
+        if status.is_of_another(context.scene):
+            column.operator("arto.adopt")
         column.separator()
-        column.prop(settings, "support")
-        column.prop(settings, "separate")
+        _settings(column, settings, *properties.FIT)
         column.operator("arto.fit", icon="MOD_LATTICE")
         _line(column, status.field_line(context.scene))
         column.separator()
-        column.prop(settings, "own_lamps")
-        column.prop(settings, "lamps")
+        _settings(column, settings, "own_lamps", "lamps")
         sub = column.column()
         sub.active = settings.lamps
-        sub.prop(settings, "lamp_samples")
-        column.prop(settings, "denoise")
+        _settings(sub, settings, "lamp_samples")
+        _settings(column, settings, "denoise", "look")
         column.operator("arto.relight", icon="WORLD")
+        self._work(column)
+
+    def _work(self, column: bpy.types.UILayout) -> None:
+        """What runs, or how the last piece of work ended."""
+        if job := session.current:
+            column.separator()
+            column.label(text=session.busy())
+            row = column.row(align=True)
+            row.progress(factor=job.state.share, text=job.line)
+            row.operator("arto.cancel", text="", icon="X")
+        elif ended := session.outcome:
+            icons = {"INFO": "INFO", "WARNING": "ERROR", "ERROR": "CANCEL"}
+            column.label(text=ended.text, icon=icons[ended.level])
 
 
 class ARTO_PT_hemicube(_Panel, bpy.types.Panel):
@@ -64,24 +92,17 @@ class ARTO_PT_hemicube(_Panel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
-        column = self.layout.column()
-        column.use_property_split = True
-        column.use_property_decorate = False
-        settings = context.scene.arto
-        column.prop(settings, "preset")
-        if settings.preset == "custom":
-            column.prop(settings, "faces")
-        sub = column.column()
-        sub.active = any(face in settings.faces for face in SIDES)
-        sub.prop(settings, "half_sides")
-        column.prop(settings, "patches")
-        column.prop(settings, "adaptive")
-        column.prop(settings, "align")
-        column.prop(settings, "rotation")
-        column.prop(settings, "far")
-        sub = column.column()
-        sub.active = not settings.far
-        sub.prop(settings, "size")
+        column, settings = self.column(), context.scene.arto
+        apply = {
+            "faces": settings.preset == "custom",
+            "half_sides": any(face in settings.faces for face in SIDES),
+            "size": not settings.far,
+        }
+        for name in properties.HEMICUBE:
+            sub = column.column()
+            sub.active = apply.get(name, True)
+            if name != "faces" or sub.active:
+                sub.prop(settings, name)
 
 
 class ARTO_PT_capture(_Panel, bpy.types.Panel):
@@ -90,21 +111,12 @@ class ARTO_PT_capture(_Panel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
-        column = self.layout.column()
-        column.use_property_split = True
-        column.use_property_decorate = False
-        settings = context.scene.arto
-        for name in (
-            "patterns",
-            "grain",
-            "route",
-            "seed",
-            "memory",
-            "environment_width",
-            "folder",
-            "output",
-        ):
-            column.prop(settings, name)
+        column, settings = self.column(), context.scene.arto
+        _settings(column, settings, *(n for n in properties.CAPTURE if n != "samples"))
+        _settings(column, settings, "environment_width", "folder", "output")
+        place = paths.shown(context.scene)
+        if place:
+            column.label(text=place, icon="FILE_FOLDER")
 
 
 CLASSES = (ARTO_PT_main, ARTO_PT_hemicube, ARTO_PT_capture)

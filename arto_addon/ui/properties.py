@@ -205,9 +205,23 @@ class ArtoSettings(bpy.types.PropertyGroup):
         max=16384,
         default=1024,
     )
+    look: StringProperty(
+        name="Look",
+        description="Name of the light that the shot is shown in. Each look has a picture and an "
+        "EXR of its own; empty: the scene's only one",
+        default="",
+    )
+    scene_id: StringProperty(
+        name="Scene ID",
+        description="By which what was captured of this scene is found when it or its file is "
+        "renamed",
+        options={"HIDDEN"},
+        default="",
+    )
     folder: StringProperty(
         name="Folder",
-        description="Where capture sets and fields are kept, in a folder named after the scene",
+        description="Where capture sets and fields are kept, in folders named after file, scene, "
+        "camera and frame",
         subtype="DIR_PATH",
         default="//arto/",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
@@ -221,12 +235,22 @@ class ArtoSettings(bpy.types.PropertyGroup):
     )
 
 
+# Which settings each piece of work reads: panel and command line take them from here.
+HEMICUBE = (
+    "preset", "faces", "half_sides", "patches", "adaptive", "align", "rotation", "far", "size",
+)  # fmt: skip
+CAPTURE = ("samples", "patterns", "grain", "route", "seed", "memory")
+FIT = ("support", "separate")
+RELIGHT = (
+    "own_lamps", "lamps", "lamp_samples", "denoise", "environment_width", "look", "output",
+)  # fmt: skip
+
 CLASSES = (ArtoSettings,)
 
 
-def attach() -> None:
+def register() -> None:
     bpy.types.Scene.arto = PointerProperty(type=ArtoSettings)
 
 
-def detach() -> None:
+def unregister() -> None:
     del bpy.types.Scene.arto

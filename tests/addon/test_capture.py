@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from arto.arto_addon import fit, work
 from arto.arto_addon.capture import capture
-from arto.arto_addon.shot import paths
+from arto.arto_addon.shot import paths, status
 from arto.core import exr
 from arto.core.capture_set import GROUP
 from arto.core.errors import ArtoError, CancelledError, CaptureSetError, SceneError
@@ -144,6 +144,11 @@ def _interrupt_after(steps, renders):
             done += 1
 
 
+def unfinished(scene):
+    """The folders of captures of the scene's shot that were stopped."""
+    return sorted(paths.place(scene).folder.glob("unfinished-*"))
+
+
 def test_cancelled_scene_is_as_before_and_goes_on(tmp_path, monkeypatch):
     scene = small_scene(tmp_path)
     monkeypatch.setattr(
@@ -153,7 +158,7 @@ def test_cancelled_scene_is_as_before_and_goes_on(tmp_path, monkeypatch):
     with pytest.raises(CancelledError, match="run it again"):
         _interrupt_after(capture.capture(scene, "ViewLayer"), 2)
     assert not differences(before, snapshot())
-    folder = paths.unfinished_capture_folder(scene)
+    (folder,) = unfinished(scene)
     head = json.loads((folder / "capture.json").read_text())
     assert [t["done"] for t in head["tiles"]] == [True, True, False]
     with pytest.raises(CaptureSetError, match="2 of 3 tiles"):
@@ -173,11 +178,17 @@ def test_another_capture_does_not_go_on_with_it(tmp_path, monkeypatch):
     )
     with pytest.raises(CancelledError):
         _interrupt_after(capture.capture(scene, "ViewLayer"), 1)
-    unfinished = paths.unfinished_capture_folder(scene)
-    old = (unfinished / "tile_0000.exr").stat().st_mtime_ns
+    (kept,) = unfinished(scene)
+    old = (kept / "tile_0000.exr").stat().st_mtime_ns
     scene.arto.samples += 1
     there = captured(scene)
     assert (there.folder / "tile_0000.exr").stat().st_mtime_ns != old
+    # nor is it thrown away: with its settings again, it goes on
+    assert status.unfinished_line(scene) == ("and unfinished: 1 of 2 tiles, 64 samples", False)
+    scene.arto.samples -= 1
+    there = captured(scene)
+    assert (there.folder / "tile_0000.exr").stat().st_mtime_ns == old
+    assert there.head["samples"] == 64 and not unfinished(scene)
     # and what a crash left behind is in nobody's way
     left = there.folder.with_name("capture.old")
     left.mkdir()
@@ -199,7 +210,12 @@ def test_cancelled_capture_keeps_the_finished_one(tmp_path):
     work.run(fit.fit(scene))
     # the new one takes its place, and nothing is left beside it
     assert captured(scene).head["samples"] == scene.arto.samples
-    assert sorted(p.name for p in there.folder.parent.iterdir()) == ["capture", "field"]
+    assert sorted(p.name for p in there.folder.parent.iterdir()) == [
+        "capture",
+        "field",
+        "lock",
+        "shot.json",
+    ]
 
 
 def test_finished_capture_leaves_the_scene_as_before(tmp_path):

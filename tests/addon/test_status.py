@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import time
 
 import bpy
 from arto.arto_addon import fit, work
@@ -23,21 +24,24 @@ def test_lines_follow_the_files(tmp_path):
     assert status.field_line(scene) == (f"{patches} patches, auto", True)
     # another shot, and back
     scene.frame_set(7)
-    for line in (status.capture_line(scene), status.field_line(scene)):
-        assert line == ("is of another frame (1, now 7): capture again", False)
+    other = ("is of another frame (1, now 7): capture again", False)
+    assert status.capture_line(scene) == other
+    assert status.field_line(scene) is None
     scene.frame_set(1)
     assert status.capture_line(scene) == expected
     # captured anew since it was fitted
-    later = (paths.field_folder(scene) / "field.json").stat().st_mtime_ns + 10**9
-    os.utime(folder / "capture.json", ns=(later, later))
+    scene.arto.seed += 1
+    captured(scene)
     assert status.field_line(scene) == ("of an earlier capture: fit again", False)
     # a capture that was stopped, and no other
-    folder.rename(paths.unfinished_capture_folder(scene))
-    head = paths.unfinished_capture_folder(scene) / "capture.json"
+    stopped = folder.with_name("unfinished-12345678")
+    folder.rename(stopped)
+    head = stopped / "capture.json"
     head.write_text(head.read_text().replace('"done": true', '"done": false'))
-    text, serves = status.capture_line(scene) or ("", False)
-    assert text == "unfinished, 0 of 1 tiles" and not serves
+    assert status.capture_line(scene) == ("unfinished, 0 of 1 tiles, 64 samples", False)
     # damaged: the rest of the panel must be drawn
+    stopped.rename(folder)
+    head, later = folder / "capture.json", time.time_ns()
     again = ("damaged, or of another version: capture again", False)
     for text in ("{", "[]", "3", "null", '{"tiles": null}', '{"version": 1, "tiles": [3]}'):
         head.write_text(text)

@@ -1,0 +1,201 @@
+"""The job's side: `blender -b snapshot.blend --command arto job task.json`.
+
+It does the work that a batch run does, by the paths of the artist's file, and writes down how far
+it is. It ends when it is told to on its standard input, or when that closes: the window is gone.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import shutil
+import signal
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...core.errors import ArtoError, CancelledError, SceneError
+from ..capture.capture import capture
+from ..fit import fit
+from ..relight.relight import compute
+from ..shot import home
+from ..work import STOPPED, Progress, Render, run
+from .task import State, Task
+
+CANCEL = "cancel\n"
+# Seconds that a render is given to end by itself once it was told to.
+PATIENCE = 8.0
+# Times a second that the progress is written down.
+_OFTEN = 5.0
+
+
+def main(path: Path) -> int:
+    """Do what the task says; the exit code."""
+    folder = path.parent
+    told = _Told(folder)
+    writer = _Writer(folder, told)
+    state = State()
+    code = 0
+    try:
+        with writer.samples():
+            result = run(_steps(Task.read(path), folder), writer)
+        made = result[0] if isinstance(result, tuple) else result
+        state = State(1.0, writer.text, end="done", result=str(made))
+    except CancelledError as e:
+        state, code = State(writer.share, str(e), end="cancelled"), 130
+    except ArtoError as e:
+        state, code = State(writer.share, str(e), end="failed"), 1
+    except Exception as e:
+        traceback.print_exc()
+        state, code = State(writer.share, f"{type(e).__name__}: {e}", end="failed"), 1
+    told.done = True
+    if told.alone:
+        shutil.rmtree(folder, ignore_errors=True)  # nobody is left to do it
+    else:
+        state.write(folder)
+    print(f"ARTO job: {state.end}: {state.text}", flush=True)
+    return code
+
+
+def _steps(task: Task, folder: Path) -> Any:
+    home.set_file(task.blend)
+    scene = bpy.data.scenes.get(task.scene)
+    if scene is None:
+        raise SceneError(f"there is no scene '{task.scene}'")
+    _use_devices(task.devices)
+    _turn_paths(folder)
+    for painted in task.painted:
+        image = bpy.data.images.get(
+            (painted.name, painted.library) if painted.library else painted.name
+        )
+        if image is None:
+            raise SceneError(f"the painted image '{painted.name}' is not in the copy of the file")
+        image.pixels.foreach_set(np.load(folder / painted.pixels))
+        image.update()
+    work = {"capture": capture, "fit": fit, "relight": compute}[task.verb]
+    return work(scene, task.view_layer)
+
+
+def _use_devices(devices: dict[str, Any]) -> None:
+    """Render with what the artist renders with."""
+    addon = bpy.context.preferences.addons.get("cycles")
+    if addon is None or not devices:
+        return
+    addon.preferences.compute_device_type = devices["kind"]
+    for device in addon.preferences.devices:
+        if device.id in devices["use"]:
+            device.use = devices["use"][device.id]
+
+
+def _turn_paths(folder: Path) -> None:
+    """Let the relative paths that Blender left alone lead from the artist's file again."""
+    if not home.file():
+        return
+    start = str(Path(home.file()).parent)
+    trees = [
+        t for m in (*bpy.data.materials, *bpy.data.worlds, *bpy.data.lights) if (t := m.node_tree)
+    ]
+    owners: list[Any] = [n for tree in (*trees, *bpy.data.node_groups) for n in tree.nodes]
+    owners += [m for o in bpy.data.objects for m in o.modifiers]
+    for owner in owners:
+        for prop in owner.bl_rna.properties:
+            if prop.type != "STRING" or prop.subtype not in {"FILE_PATH", "DIR_PATH"}:
+                continue
+            path = getattr(owner, prop.identifier)
+            if not path.startswith("//") or prop.is_readonly:
+                continue
+            there = Path(bpy.path.abspath(path, start=start))
+            if there.exists() and not Path(bpy.path.abspath(path, start=str(folder))).exists():
+                setattr(owner, prop.identifier, str(there))
+
+
+class _Told:
+    """Listens to the window: a line, or the end of the pipe, ends the work."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.to_end = False
+        self.done = False
+        self.alone = False
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def _listen(self) -> None:
+        self.alone = sys.stdin.readline() == ""
+        self.to_end = True
+        # Ctrl-C ends a render; a second one would kill Blender as it stands
+        signal.raise_signal(signal.SIGINT)
+        until = time.monotonic() + PATIENCE
+        while not self.done and time.monotonic() < until:
+            time.sleep(0.1)
+        if not self.done:
+            if self.alone:
+                shutil.rmtree(self.folder, ignore_errors=True)
+            os._exit(130)
+
+
+class _Writer:
+    """Writes progress down, the samples of a render included."""
+
+    def __init__(self, folder: Path, told: _Told) -> None:
+        self.folder = folder
+        self.told = told
+        self.begun = time.monotonic()
+        self.share = 0.0
+        self.text = "starting"
+        self._first: tuple[float, float] | None = None
+        self._written = 0.0
+        self._render: Render | None = None
+
+    def __call__(self, step: Progress | Render) -> None:
+        if self.told.to_end:
+            raise CancelledError(STOPPED)
+        self._render = step if isinstance(step, Render) else None
+        said = self.text
+        self.share, self.text = step.share, step.text
+        if self._render and self._first is None:
+            # what was there already took no time
+            self._first = time.monotonic(), step.share
+        self._write(soon=said != self.text)
+        if said != self.text:
+            print(f"ARTO job: {self.share:4.0%} {self.text}", flush=True)
+
+    def _write(self, soon: bool = False) -> None:
+        now = time.monotonic()
+        if not soon and now - self._written < 1 / _OFTEN:
+            return
+        self._written = now
+        left = None
+        if self._first:
+            at, share = self._first
+            if self.share > share and now - at > 1:
+                left = (now - at) / (self.share - share) * (1 - self.share)
+        with contextlib.suppress(OSError):  # a full disk is the work's to find
+            State(self.share, self.text, now - self.begun, left).write(self.folder)
+
+    @contextlib.contextmanager
+    def samples(self) -> Iterator[None]:
+        """Follow the samples of the renders."""
+
+        def told(*arguments: Any) -> None:
+            found = _SAMPLE.search(str(arguments[0])) if arguments else None
+            if found and self._render:
+                part = int(found[1]) / max(int(found[2]), 1)
+                self.share = self._render.share + self._render.span * min(part, 1.0)
+                self._write()
+
+        bpy.app.handlers.render_stats.append(told)
+        try:
+            yield
+        finally:
+            bpy.app.handlers.render_stats.remove(told)
+
+
+_SAMPLE = re.compile(r"Sample (\d+)/(\d+)")

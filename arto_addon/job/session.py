@@ -1,0 +1,276 @@
+"""The window's side of a job: the one that runs in this session, and what became of the last.
+
+A job holds no data-block of the file that is open and no event of the window: it is a process and a
+folder. So whatever the artist does meanwhile, undo, another file, quitting, does not reach it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ...core.errors import BusyError, SceneError
+from ...core.files import Lock
+from ..shot import paths, watch
+from ..shot.shot import shot_of
+from . import snapshot
+from .run import CANCEL, PATIENCE
+from .task import State, clock
+
+# How often the window looks how far the job is.
+EVERY = 0.2
+DOING = {"capture": "capturing", "fit": "fitting", "relight": "relighting"}
+LOG = "log.txt"
+
+
+@dataclass
+class Outcome:
+    """How the last job ended. level: `INFO`, `WARNING` or `ERROR`."""
+
+    level: str
+    text: str
+
+
+class Job:
+    """A job that runs: a Blender of its own on a snapshot in a folder of its own."""
+
+    def __init__(self, verb: str, scene: bpy.types.Scene, view_layer: str) -> None:
+        """Take the snapshot and start. Raises SceneError, BusyError; then nothing is left."""
+        self.verb = verb
+        self.begun = time.monotonic()
+        shot = shot_of(scene, view_layer)
+        self.title = shot.title
+        claimed = paths.claim(scene, view_layer)
+        # an undo step with the ID that the claim may have given is wanted: without it an undo
+        # would take it away, and a save after that lose what was captured
+        self.scene_id = scene.arto.scene_id
+        self.blend = bpy.data.filepath
+        self.look = scene.arto.look.strip()
+        _remove_leftovers(claimed)
+        if verb != "relight" and (holder := Lock.holder(claimed)):
+            raise BusyError(
+                f"{claimed} is in use: {holder}; wait until it is done, or end it there"
+            )
+        self.folder = Path(tempfile.mkdtemp(prefix="job-", dir=claimed))
+        self.lock = Lock(self.folder, "following").__enter__()
+        try:
+            blend, task = snapshot.take(self.folder, verb, scene, view_layer)
+            self.log = (self.folder / LOG).open("wb")
+            self.process = subprocess.Popen(
+                _command(blend, task),
+                stdin=subprocess.PIPE,
+                stdout=self.log,
+                stderr=subprocess.STDOUT,
+                **_QUIETLY,
+            )
+        except OSError as e:
+            self.remove()
+            raise SceneError(f"a second Blender cannot be started ({e})") from e
+        except BaseException:
+            self.remove()
+            raise
+        self.told: float | None = None
+        self.state = State()
+
+    def look(self) -> bool:
+        """Whether it still runs; `state` is then how far it is, else how it ended."""
+        running = self.process.poll() is None
+        found = State.read(self.folder)
+        if running:
+            self.state = found if not found.end else self.state
+            if self.told and time.monotonic() - self.told > PATIENCE + 4:
+                self.process.kill()
+            return True
+        if not found.end and self.told:
+            found = State(found.share, "cancelled: finished tiles are kept", end="cancelled")
+        elif not found.end:
+            text = f"its Blender ended too early (exit code {self.process.returncode})"
+            lines = self._last_lines()
+            found = State(
+                found.share,
+                f"{text}: finished tiles are kept, press it again to go on{lines}",
+                end="failed",
+            )
+        self.state = found
+        return False
+
+    def _last_lines(self) -> str:
+        with contextlib.suppress(OSError):
+            text = (self.folder / LOG).read_text(encoding="utf-8", errors="replace")
+            # for the console; the panel has the first line
+            return "\n" + "\n".join(text.strip().splitlines()[-8:])
+        return ""
+
+    def cancel(self) -> None:
+        """Tell it to end: at the next step, or in the middle of a render."""
+        self.told = self.told or time.monotonic()
+        with contextlib.suppress(OSError, ValueError):
+            self.process.stdin.write(CANCEL.encode())
+            self.process.stdin.flush()
+
+    def remove(self) -> None:
+        """Remove its folder, once it has ended."""
+        if log := getattr(self, "log", None):
+            log.close()
+        self.lock.__exit__(None, None, None)
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    @property
+    def line(self) -> str:
+        """How far it is, in words."""
+        if self.told:
+            return "stopping"
+        text = f"{self.state.text}, {clock(time.monotonic() - self.begun)}"
+        left = self.state.left
+        return text + (f", about {clock(left)} left" if left is not None else "")
+
+
+# No window of a console, and the artist's work first.
+_QUIETLY: dict = (
+    {"creationflags": 0x08000000 | 0x00004000} if sys.platform == "win32" else {}  # type: ignore
+)
+
+
+def _command(blend: Path, task: Path) -> list[str]:
+    trusted = "--disable-autoexec" if bpy.app.autoexec_fail else "--enable-autoexec"
+    addon = __package__.rpartition(".arto_addon")[0]
+    line = [bpy.app.binary_path, "-b", trusted, "--addons", addon, str(blend)]
+    return [*line, "--command", "arto", "job", str(task)]
+
+
+def _remove_leftovers(claimed: Path) -> None:
+    """Folders of jobs whose windows are gone without a word."""
+    for folder in claimed.glob("job-*"):
+        if folder.is_dir() and not Lock.holder(folder):
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+current: Job | None = None
+outcome: Outcome | None = None
+# What is done in the window with what a job has made, by verb.
+finishers: dict[str, Callable[[Job], str]] = {}
+
+
+def busy() -> str:
+    """What runs, in words for a button that has to wait; empty where nothing does."""
+    return f"ARTO is {DOING[current.verb]} {current.title}" if current else ""
+
+
+def start(verb: str, scene: bpy.types.Scene, view_layer: str) -> Job:
+    """Start a job. Raises BusyError where one runs, SceneError; the window goes on."""
+    global current, outcome
+    if current:
+        raise BusyError(f"{busy()}: wait until it is done, or cancel it")
+    outcome = None
+    current = Job(verb, scene, view_layer)
+    bpy.app.timers.register(_follow, first_interval=EVERY, persistent=True)
+    watch.redraw()
+    return current
+
+
+def cancel() -> None:
+    if current:
+        current.cancel()
+
+
+def _follow() -> float | None:
+    """Look how far the job is; when it has ended, do what is to be done in the window."""
+    global current, outcome
+    if current is None:
+        return None
+    job = current
+    if job.look():
+        _show_share(job)
+        watch.redraw()
+        return EVERY
+    if job.state.end == "done" and _in_the_middle():
+        return EVERY  # of a drag or a stroke: the window is not touched
+    try:
+        level = {"done": "INFO", "cancelled": "WARNING"}.get(job.state.end, "ERROR")
+        text = job.state.text
+        if job.state.end == "done" and job.verb in finishers:
+            text = finishers[job.verb](job)
+        outcome = Outcome(level, text)
+    except Exception as e:
+        outcome = Outcome("ERROR", f"{type(e).__name__}: {e}")
+        raise
+    finally:
+        current = None
+        job.remove()
+        _show_share(None)
+        paths.forget()
+        if outcome:
+            print(f"ARTO {job.verb}: {outcome.text}", flush=True)
+            outcome.text = outcome.text.splitlines()[0]
+        watch.redraw()
+    return None
+
+
+# What a person has in hand: other add-ons have operators that run all the time.
+_HANDS = (
+    "TRANSFORM_",
+    "PAINT_",
+    "SCULPT_",
+    "MESH_",
+    "CURVE_",
+    "VIEW3D_",
+    "NODE_",
+    "GREASE_PENCIL_",
+)
+
+
+def _in_the_middle() -> bool:
+    windows = bpy.context.window_manager.windows
+    return any(o.bl_idname.startswith(_HANDS) for w in windows for o in w.modal_operators)
+
+
+def _show_share(job: Job | None) -> None:
+    for window in bpy.context.window_manager.windows:
+        window.workspace.status_text_set(
+            f"ARTO is {DOING[job.verb]}: {job.state.share:.0%} {job.line}   (ESC: cancel)"
+            if job
+            else None
+        )
+
+
+def end() -> None:
+    """Blender quits, or ARTO is switched off: the job ends with it, finished tiles stay.
+
+    It ends because its input closes, as it does when this process is killed, and removes its folder
+    by itself: there is no need to wait for it.
+    """
+    global current
+    if current is None:
+        return
+    job, current = current, None
+    with contextlib.suppress(OSError):
+        job.process.stdin.close()
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        job.process.wait(2)
+    job.lock.__exit__(None, None, None)
+
+
+@persistent
+def _quitting(*_: object) -> None:
+    end()
+
+
+def register() -> None:
+    bpy.app.handlers.exit_pre.append(_quitting)
+
+
+def unregister() -> None:
+    bpy.app.handlers.exit_pre.remove(_quitting)
+    end()
+    if bpy.app.timers.is_registered(_follow):
+        bpy.app.timers.unregister(_follow)

@@ -1,0 +1,310 @@
+"""Every value of a data-block as bytes, and the data-blocks that it points to.
+
+It goes over what Blender says that a data-block has, not over a list, so that new settings of a new
+Blender are met too. What only the artist's screen shows (selection, colours of nodes, what is
+folded) is passed by.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...core.errors import ArtoError
+from . import home
+
+_DEPTH = 12
+
+
+def _names(text: str) -> set[str]:
+    return set(text.split())
+
+
+# Blender's own, and what changes by being looked at.
+_NEVER = _names("""
+    rna_type name name_full original session_uid users tag is_evaluated use_fake_user
+    use_extra_user preview asset_data override_library library library_weak_reference
+    animation_data id_data update_tag runtime_flag annotation grease_pencil bindcode depsgraph
+    pixels execution_time persistent_uid
+""")
+# Of an editor and not of the picture.
+_SCREEN = _names("""
+    select hide hide_select hide_viewport display display_type display_size empty_display_size
+    empty_display_type lineart track_axis up_axis lock_location lock_rotation lock_scale
+    lock_rotation_w lock_rotations_4d use_pin color_tag levels bound_box selection texture_mesh
+    use_mesh_mirror_x use_mesh_mirror_y use_mesh_mirror_z use_mirror_topology use_paint_mask
+    use_paint_mask_vertex use_paint_bone_selection use_mesh_edit_mode use_mirror_vertex_groups
+    passepartout_alpha passepartout_color composition_guide_color use_camera_lock_parent
+    select_control_point select_left_handle select_right_handle select_end select_point
+    use_preview_world preview_render_type remesh_mode remesh_voxel_size symmetry_mode
+    remesh_voxel_adaptivity use_remesh_fix_poles use_remesh_preserve_volume
+    use_remesh_preserve_attributes
+""")
+_SCREEN_KEPT = {
+    "show_render", "show_instancer_for_render", "show_only_shape_key", "show_unborn", "show_dead",
+    "show_alive",
+}  # fmt: skip
+_NODES_OWN = {
+    "location", "location_absolute", "width", "height", "dimensions", "color", "use_custom_color",
+    "label", "parent", "warning_propagation", "internal_links",
+}  # fmt: skip
+# A transform is told by its channels; these are worked out from them.
+_DERIVED = {
+    "matrix_world",
+    "matrix_local",
+    "matrix_basis",
+    "matrix",
+    "matrix_channel",
+    "head",
+    "tail",
+}
+# Data-blocks that a picture's objects may point to without being made of them.
+_OTHERS = (
+    bpy.types.Scene, bpy.types.World, bpy.types.Action, bpy.types.Text, bpy.types.Library,
+    bpy.types.Screen, bpy.types.WorkSpace, bpy.types.WindowManager, bpy.types.Brush,
+)  # fmt: skip
+# Their values are arrays, read as such.
+_ARRAYS = _names("""
+    vertices edges loops polygons loop_triangles attributes uv_layers color_attributes points
+    vertex_normals polygon_normals corner_normals skin_vertices curve_offset_data curves data
+    position_data normals vertex_colors loop_triangle_polygons vertex_creases edge_creases
+""")
+_ARRAY_OWNERS = (
+    bpy.types.Mesh, bpy.types.Curves, bpy.types.PointCloud, bpy.types.ShapeKey,
+)  # fmt: skip
+
+
+# Custom properties of other data-blocks are of no use to a shader.
+_CUSTOM = (bpy.types.Object, bpy.types.Mesh, bpy.types.Material, bpy.types.Camera, bpy.types.Light)
+
+
+class Walk:
+    """One data-block's digest, and what it points to."""
+
+    def __init__(self, block: bpy.types.ID) -> None:
+        self._hash = hashlib.blake2b(digest_size=12)
+        self.found: list[bpy.types.ID] = []
+        self._seen: set[tuple[int, type]] = set()
+        self._struct(block, 0)
+
+    @property
+    def digest(self) -> str:
+        return self._hash.hexdigest()
+
+    def _put(self, *values: Any) -> None:
+        self._hash.update(repr(values).encode("utf-8", "surrogatepass"))
+
+    def _struct(self, value: Any, depth: int) -> None:
+        # a socket knows its node, which knows its sockets: each once
+        key = value.as_pointer(), type(value)
+        if key in self._seen:
+            return
+        self._seen.add(key)
+        node = isinstance(value, bpy.types.Node)
+        for name, kind, array in _properties(type(value), value.bl_rna):
+            if node and name in _NODES_OWN:
+                continue
+            if kind == "COLLECTION":
+                self._collection(name, value, depth)
+                continue
+            item = getattr(value, name)
+            if kind == "POINTER":
+                self._pointer(name, item, depth)
+            elif kind == "FLOAT" and array:
+                self._put(name, [round(x, 6) for x in _flat(item)])
+            elif kind == "FLOAT":
+                self._put(name, round(item, 6))
+            else:
+                self._put(name, sorted(item) if isinstance(item, set) else _plain(item))
+        if not isinstance(value, bpy.types.ID) or isinstance(value, _CUSTOM):
+            self._custom(value)
+
+    def _custom(self, value: Any) -> None:
+        """Custom properties: drivers and Attribute nodes read them, modifiers keep inputs there."""
+        try:
+            names = sorted(value.keys())
+        except (TypeError, AttributeError):
+            return
+        for name in names:
+            item = value[name]
+            if name.startswith(("arto", "_RNA_UI", "cycles")):
+                continue
+            if isinstance(item, bpy.types.ID):
+                self._pointer(name, item, _DEPTH)
+            elif isinstance(item, float):
+                self._put(name, round(item, 6))
+            elif isinstance(item, int | str | bool):
+                self._put(name, item)
+            elif hasattr(item, "to_list"):
+                self._put(name, item.to_list())
+            elif hasattr(item, "to_dict"):
+                self._put(name, sorted(item.to_dict()))
+
+    def _pointer(self, name: str, item: Any, depth: int) -> None:
+        if item is None:
+            return
+        embedded = isinstance(item, bpy.types.ID) and item.is_embedded_data
+        if isinstance(item, bpy.types.ID) and not embedded:
+            if not isinstance(item, _OTHERS):
+                self._put(name, type(item).__name__, item.name_full)
+                self.found.append(item)
+            return
+        if depth < _DEPTH:
+            self._put(name)
+            self._struct(item, depth + 1)
+
+    def _collection(self, name: str, value: Any, depth: int) -> None:
+        if name in _ARRAYS and isinstance(value, _ARRAY_OWNERS):
+            return
+        if depth >= _DEPTH:
+            return
+        self._put(name)
+        for item in getattr(value, name):
+            if isinstance(item, bpy.types.NodeLink):
+                self._put(item.from_node.name, item.from_socket.identifier)
+                self._put(item.to_node.name, item.to_socket.identifier, item.is_muted)
+            elif isinstance(item, bpy.types.ID):
+                self._pointer(name, item, depth)
+            elif item is not None:
+                if hasattr(item, "name"):
+                    self._put(item.name)
+                self._struct(item, depth + 1)
+
+
+def _plain(item: Any) -> Any:
+    return [_plain(i) for i in item] if isinstance(item, bpy.types.bpy_prop_array) else item
+
+
+def _flat(item: Any) -> Iterator[float]:
+    for x in item:
+        if isinstance(x, float | int):
+            yield x
+        else:
+            yield from _flat(x)
+
+
+_kept: dict[type, list[tuple[str, str, bool]]] = {}
+
+
+def _properties(kind: type, rna: Any) -> list[tuple[str, str, bool]]:
+    """(name, kind, whether an array) of the properties of a type that decide a picture."""
+    if kind not in _kept:
+        out = []
+        for prop in rna.properties:
+            name = prop.identifier
+            pointing = prop.type in {"POINTER", "COLLECTION"}
+            if name in _NEVER or name in _SCREEN or name in _DERIVED:
+                continue
+            if name.startswith(("show_", "active_", "bl_")) and name not in _SCREEN_KEPT:
+                continue
+            if prop.is_readonly and not pointing:
+                continue
+            array = bool(getattr(prop, "is_array", False))
+            out.append((name, prop.type, array))
+        _kept[kind] = out
+    return _kept[kind]
+
+
+def arrays(data: Any) -> str:
+    """The digest of a geometry's arrays: mesh, hair curves, point cloud."""
+    out = hashlib.blake2b(digest_size=12)
+    for attribute in data.attributes:
+        name = attribute.name
+        if name.startswith((".select", ".hide", ".uv_select", ".vs.", ".es.", ".pn.", ".sculpt")):
+            continue
+        field, width, kind = _FIELDS.get(attribute.data_type, ("", 0, np.float32))
+        if not field:
+            out.update(repr([str(x.value) for x in attribute.data]).encode())
+            continue
+        values = np.empty(len(attribute.data) * width, kind)
+        attribute.data.foreach_get(field, values)
+        out.update(f"{name} {attribute.domain} {attribute.data_type}".encode())
+        out.update(values)
+    if isinstance(data, bpy.types.Mesh):
+        starts = np.empty(len(data.polygons), np.int32)
+        data.polygons.foreach_get("loop_start", starts)
+        out.update(starts)
+    elif isinstance(data, bpy.types.Curves):
+        starts = np.empty(len(data.curve_offset_data), np.int32)
+        data.curve_offset_data.foreach_get("value", starts)
+        out.update(starts)
+    return out.hexdigest()
+
+
+_FIELDS: dict[str, tuple[str, int, type]] = {
+    "FLOAT": ("value", 1, np.float32),
+    "INT": ("value", 1, np.int32),
+    "BOOLEAN": ("value", 1, np.bool_),
+    "INT8": ("value", 1, np.int8),
+    "FLOAT_VECTOR": ("vector", 3, np.float32),
+    "FLOAT2": ("vector", 2, np.float32),
+    "FLOAT_COLOR": ("color", 4, np.float32),
+    "BYTE_COLOR": ("color", 4, np.float32),
+    "INT32_2D": ("value", 2, np.int32),
+    "INT16_2D": ("value", 2, np.int16),
+    "QUATERNION": ("value", 4, np.float32),
+    "FLOAT4X4": ("value", 16, np.float32),
+}
+
+
+def shape_keys(keys: bpy.types.Key) -> str:
+    """The digest of a shape key's points."""
+    out = hashlib.blake2b(digest_size=12)
+    for block in keys.key_blocks:
+        values = np.empty(len(block.data) * 3, np.float32)
+        if len(block.data) and hasattr(block.data[0], "co"):
+            block.data.foreach_get("co", values)
+        out.update(values)
+    return out.hexdigest()
+
+
+# Of files: (path, size, time) -> digest of what is in them.
+_contents: dict[tuple[str, int, int], str] = {}
+
+
+def image(block: bpy.types.Image, then: str = "", full: bool = False) -> str:
+    """The digest of an image: what is painted or made, else what is packed, else its file.
+
+    then: the digest that it is going to be compared with; a file that has another time and the same
+    size is then read, and has that digest if nothing in it has changed. full: read it in any case.
+    """
+    out = hashlib.blake2b(digest_size=12)
+    if block.is_dirty or (block.source == "GENERATED" and not block.packed_file):
+        values = np.empty(len(block.pixels), np.float32)
+        block.pixels.foreach_get(values)
+        out.update(values)
+        return out.hexdigest()
+    if block.packed_files:
+        for packed in block.packed_files:
+            out.update(packed.packed_file.data)
+        return out.hexdigest()
+    return file(block.filepath, block.library, then, full)
+
+
+def file(path: str, library: bpy.types.Library | None, then: str = "", full: bool = False) -> str:
+    """The digest of a file, `size:time:digest of what is in it`; see `image`."""
+    if not path:
+        return "none"
+    try:
+        there = home.absolute(path, library)
+        stat = there.stat()
+        size, at = stat.st_size, stat.st_mtime_ns
+        was = then.split(":")
+        touched = len(was) == 3 and was[0] == str(size) and was[1] != str(at)
+        if not (full or touched):
+            same = was if was[:2] == [str(size), str(at)] else ["", "", ""]
+            return f"{size}:{at}:{same[2]}"
+        key = str(there), size, at
+        if key not in _contents:
+            with there.open("rb") as f:
+                _contents[key] = hashlib.file_digest(
+                    f, lambda: hashlib.blake2b(digest_size=12)
+                ).hexdigest()
+    except (OSError, ArtoError) as e:  # it is not there: that is its state
+        return f"{Path(path).name} {type(e).__name__}"
+    return then if touched and was[2] == _contents[key] else f"{size}:{at}:{_contents[key]}"

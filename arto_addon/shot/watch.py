@@ -1,0 +1,131 @@
+"""Keeps the scene's fingerprint up to date: worked out after a change, never while drawing."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.app.handlers import persistent
+
+from . import fingerprint as prints
+from .fingerprint import Fingerprint
+
+# After a change, so much time without another before it is looked at.
+REST = 0.3
+_latest: dict[tuple[int, str], Fingerprint] = {}
+_asked: dict[tuple[int, str], Fingerprint] = {}
+_stale: set[tuple[int, str]] = set()
+
+
+def latest(
+    scene: bpy.types.Scene, view_layer: str, then: Fingerprint, now: bool
+) -> Fingerprint | None:
+    """The fingerprint of a view layer, None where it is not known yet (then it soon will be).
+
+    then: what it is going to be compared with; now: work it out here, which takes a while.
+    """
+    key = scene.session_uid, view_layer
+    if now:
+        prints.forget()  # nobody tells of changes in batch
+        return prints.fingerprint(scene, view_layer, then)
+    if key not in _asked or _asked[key] is not then:
+        _asked[key] = then
+        _stale.add(key)
+        _look_soon()
+    return _latest.get(key)
+
+
+def _look_soon() -> None:
+    # again from the beginning where it waits already: nothing is looked at in the middle of a drag
+    if bpy.app.timers.is_registered(_look):
+        bpy.app.timers.unregister(_look)
+    bpy.app.timers.register(_look, first_interval=REST)
+
+
+def _look() -> float | None:
+    """Work out what is stale, once nothing else is going on; redraw what shows it."""
+    manager = bpy.context.window_manager
+    if any(w.screen.is_animation_playing for w in manager.windows):
+        return REST
+    if bpy.app.is_job_running("RENDER"):
+        return REST
+    scenes = {s.session_uid: s for s in bpy.data.scenes}
+    for key in list(_stale):
+        _stale.discard(key)
+        uid, view_layer = key
+        scene = scenes.get(uid)
+        if scene is None or view_layer not in scene.view_layers:
+            _latest.pop(key, None)
+            _asked.pop(key, None)
+            continue
+        _latest[key] = prints.fingerprint(scene, view_layer, _asked[key])
+    redraw()
+    return None
+
+
+def redraw() -> None:
+    """Draw again what shows ARTO's panels."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type in {"PROPERTIES", "VIEW_3D", "IMAGE_EDITOR", "NODE_EDITOR"}:
+                area.tag_redraw()
+
+
+@persistent
+def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if not _asked:
+        return
+    # what hangs on a mesh is named with it: its data, whose arrays are kept, and the object, whose
+    # deformed shape is
+    geometry = set()
+    for update in depsgraph.updates:
+        if update.is_updated_geometry:
+            block = update.id.original
+            geometry.add(block.session_uid)
+            data = getattr(block, "data", None)
+            if isinstance(data, bpy.types.ID):
+                geometry.add(data.session_uid)
+                keys = getattr(data, "shape_keys", None)
+                if keys:
+                    geometry.add(keys.session_uid)
+    prints.forget(geometry)
+    _stale.update(_asked)
+    _look_soon()
+
+
+@persistent
+def _all_changed(*_: object) -> None:
+    """After undo, redo, a saved or another file: look again, at everything that may be another."""
+    prints.forget()
+    scenes = {s.session_uid for s in bpy.data.scenes}
+    for kept in (_latest, _asked):
+        for key in [k for k in kept if k[0] not in scenes]:
+            del kept[key]
+    if _asked:
+        _stale.update(_asked)
+        _look_soon()
+
+
+_HANDLERS = {
+    "depsgraph_update_post": _changed,
+    "frame_change_post": _changed,
+    "undo_post": _all_changed,
+    "redo_post": _all_changed,
+    "load_post": _all_changed,
+}
+
+
+def register() -> None:
+    if bpy.app.background:
+        return  # nothing is drawn: whoever asks has it worked out
+    for name, handler in _HANDLERS.items():
+        getattr(bpy.app.handlers, name).append(handler)
+
+
+def unregister() -> None:
+    for name, handler in _HANDLERS.items():
+        handlers = getattr(bpy.app.handlers, name)
+        if handler in handlers:
+            handlers.remove(handler)
+    if bpy.app.timers.is_registered(_look):
+        bpy.app.timers.unregister(_look)
+    for kept in (_latest, _asked, _stale):
+        kept.clear()

@@ -1,0 +1,34 @@
+"""ARTO's preferences: of the machine, not of a scene."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty
+
+ADDON = __package__.rpartition(".arto_addon")[0]
+
+
+class ArtoPreferences(bpy.types.AddonPreferences):
+    """What holds for every file on this machine."""
+
+    bl_idname = ADDON
+
+    run_here: BoolProperty(
+        name="Run in This Blender",
+        description="Capture, fit and relight in this Blender instead of a second one, for "
+        "machines whose memory holds the scene only once. The window takes no input meanwhile, "
+        "but for ESC",
+        default=False,
+    )
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.prop(self, "run_here")
+
+
+def run_here(context: bpy.types.Context) -> bool:
+    """Whether work runs in this process."""
+    addon = context.preferences.addons.get(ADDON)
+    return bool(addon and addon.preferences and addon.preferences.run_here)
+
+
+CLASSES = (ArtoPreferences,)
