@@ -259,8 +259,12 @@ def contents():
     }
 
 
+session = next(m for n, m in sys.modules.items() if n.endswith(".arto_addon.job.session"))
+
+
 def running(window):
-    return any(o.bl_idname.startswith("ARTO_OT") for o in window.modal_operators)
+    # a job's end waits for no hand on the mouse: none is
+    return session.current is not None
 
 
 def step():
@@ -278,6 +282,7 @@ def step():
         found[-1]["after"] = contents()
         found[-1]["seconds"] = time.monotonic() - state["since"]
         found[-1]["escaped"] = state["escaped"]
+        found[-1]["outcome"] = [session.outcome.level, session.outcome.text]
     state["at"] += 1
     if state["at"] == len(presses):
         nodes = bpy.context.scene.compositing_node_group
@@ -326,13 +331,15 @@ def press(program: Program, scene: Path, *presses: tuple[str, float | None]) -> 
     done = program.run(*window, escape=escape)
     assert report.is_file(), said(done)
     out = json.loads(report.read_text())
-    assert "error" not in out, out["error"]
+    assert "error" not in out, out["error"] + said(done)
     check_quiet(done)
     return out
 
 
 def test_buttons(program: Program, scene: Path, reference: np.ndarray) -> None:
     out = press(program, scene, ("capture", None), ("fit", None), ("relight", None))
+    for pressed in out["presses"]:
+        assert pressed["outcome"][0] == "INFO", pressed
     for pressed in out["presses"][:2]:
         assert pressed["before"] == pressed["after"]
     assert out["image"] == [WIDTH, HEIGHT]

@@ -11,7 +11,6 @@ import os
 import re
 import shutil
 import signal
-import sys
 import threading
 import time
 import traceback
@@ -128,7 +127,8 @@ class _Told:
         threading.Thread(target=self._listen, daemon=True).start()
 
     def _listen(self) -> None:
-        self.alone = sys.stdin.readline() == ""
+        # by the descriptor: Python waits at its end for who reads its own stream
+        self.alone = os.read(0, len(CANCEL)) == b""
         self.to_end = True
         # Ctrl-C ends a render; a second one would kill Blender as it stands
         signal.raise_signal(signal.SIGINT)

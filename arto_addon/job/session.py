@@ -55,7 +55,7 @@ class Job:
         # would take it away, and a save after that lose what was captured
         self.scene_id = scene.arto.scene_id
         self.blend = bpy.data.filepath
-        self.look = scene.arto.look.strip()
+        self.light = scene.arto.look.strip()
         _remove_leftovers(claimed)
         if verb != "relight" and (holder := Lock.holder(claimed)):
             raise BusyError(

@@ -22,7 +22,7 @@ def show_relit(job: Job) -> str:
         return f"wrote {path} (its scene is not open any more)"
     window = bpy.context.window_manager.windows[0]
     with bpy.context.temp_override(window=window):
-        reveal(plate.present(scene, path, job.look))
+        reveal(plate.present(scene, path, job.light))
     return job.state.text
 
 
