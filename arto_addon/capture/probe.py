@@ -15,7 +15,7 @@ from ...core.errors import CaptureSetError
 from ...core.hemicube import FINEST, Hemicube
 from ...core.patterns import pattern_set
 from ...core.refine import check, refine
-from ..stage.stage import Stage
+from ..stage.stage import Stage, picture_region, picture_size
 from ..work import Render, Steps
 from . import planes
 
@@ -35,20 +35,28 @@ def refined(on: Stage, hemicube: Hemicube, most: int) -> Steps:
     fine = replace(hemicube, patches=FINEST)
     patterns = pattern_set("white")
     images = [(k, "white") for k in range(len(fine))]
-    share = math.sqrt(PIXELS / (render.resolution_x * render.resolution_y))
+    width, height = picture_size(scene)
+    region = picture_region(scene)
+    share = math.sqrt(PIXELS / region.pixels)
     were = {
         (owner, name): getattr(owner, name)
         for owner, names in (
-            (render, ("resolution_x", "resolution_y", "resolution_percentage", "use_border")),
+            (
+                render,
+                ("resolution_x", "resolution_y", "resolution_percentage", "use_crop_to_border"),
+            ),
             (cycles, ("samples",)),
         )
         for name in names
     }
     with tempfile.TemporaryDirectory() as folder:
         try:
-            render.resolution_x = max(8, round(render.resolution_x * share))
-            render.resolution_y = max(8, round(render.resolution_y * share))
-            render.resolution_percentage, render.use_border = 100, False
+            # as large as makes the part that is captured, a render region of the artist's, that
+            # many pixels
+            render.resolution_x = max(8, round(width * share))
+            render.resolution_y = max(8, round(height * share))
+            render.resolution_percentage = 100
+            render.use_crop_to_border = render.use_border
             cycles.samples = SAMPLES
             path = Path(folder) / "probe.exr"
             render.filepath = str(path)

@@ -289,7 +289,10 @@ def relit_file(scene: bpy.types.Scene) -> Path:
             path = path.with_suffix(".exr")
         elif path.suffix.lower() != ".exr":  # a version or a dot of the name's own
             path = path.with_name(path.name + ".exr")
-        return path.with_name(f"{path.stem}_{safe_name(look)}.exr") if look else path
+        # a copied scene has the output of the one it was copied from
+        shared = any(s.arto.output == scene.arto.output for s in bpy.data.scenes if s != scene)
+        parts = [*([scene.name] if shared else []), *([look] if look else [])]
+        return path.with_name("_".join([path.stem, *map(safe_name, parts)]) + ".exr")
     if not home.file():
         raise SceneError(
             "this .blend was never saved, so the relit picture has no place to go: save it, or "

@@ -70,9 +70,11 @@ def test_the_version_before_is_read() -> None:
     )
 
 
+WRONG = ({"frame": "1"}, {"width": True}, {"lens": 3}, {"scene": 3}, {"scene_id": []})
+
+
 @pytest.mark.parametrize(
-    "data",
-    [None, [], 3, "x", {}, {"scene": 3}, {**SHOT.to_json(), "frame": "1"}, {**SHOT.to_json(), "width": True}, {**SHOT.to_json(), "lens": 3}],
+    "data", [None, [], 3, "x", {}, *({**SHOT.to_json(), **wrong} for wrong in WRONG)]
 )
 def test_what_is_no_shot_is_said(data: object) -> None:
     with pytest.raises(ShotError):
