@@ -266,11 +266,13 @@ def _quitting(*_: object) -> None:
 
 
 def register() -> None:
-    bpy.app.handlers.exit_pre.append(_quitting)
+    if not bpy.app.background:  # without a window there is no job to end
+        bpy.app.handlers.exit_pre.append(_quitting)
 
 
 def unregister() -> None:
-    bpy.app.handlers.exit_pre.remove(_quitting)
+    if _quitting in bpy.app.handlers.exit_pre:
+        bpy.app.handlers.exit_pre.remove(_quitting)
     end()
     if bpy.app.timers.is_registered(_follow):
         bpy.app.timers.unregister(_follow)

@@ -30,7 +30,7 @@ _NEVER = _names("""
     rna_type name name_full original session_uid users tag is_evaluated use_fake_user
     use_extra_user preview asset_data override_library library library_weak_reference
     animation_data id_data update_tag runtime_flag annotation grease_pencil bindcode depsgraph
-    pixels execution_time persistent_uid
+    pixels execution_time persistent_uid is_runtime_data filepath_raw
 """)
 # Of an editor and not of the picture.
 _SCREEN = _names("""
@@ -119,6 +119,9 @@ class Walk:
                 self._put(name, [round(x, 6) for x in _flat(item)])
             elif kind == "FLOAT":
                 self._put(name, round(item, 6))
+            elif kind == "PATH":
+                # where a file is changes with the .blend's own place; which one it is does not
+                self._put(name, item.replace("\\", "/").rpartition("/")[2])
             else:
                 self._put(name, sorted(item) if isinstance(item, set) else _plain(item))
         if not isinstance(value, bpy.types.ID) or isinstance(value, _CUSTOM):
@@ -205,7 +208,8 @@ def _properties(kind: type, rna: Any) -> list[tuple[str, str, bool]]:
             if prop.is_readonly and not pointing:
                 continue
             array = bool(getattr(prop, "is_array", False))
-            out.append((name, prop.type, array))
+            path = prop.type == "STRING" and prop.subtype in {"FILE_PATH", "DIR_PATH"}
+            out.append((name, "PATH" if path else prop.type, array))
         _kept[kind] = out
     return _kept[kind]
 
