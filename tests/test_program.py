@@ -9,115 +9,24 @@ from __future__ import annotations
 import json
 import os
 import re
-import shlex
 import shutil
 import signal
 import subprocess
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from arto.core import exr
-
-from tools import package
+from program_tools import HEIGHT, MAKE_SCENE, ROOT, WIDTH, Program, said
 
 pytestmark = pytest.mark.skipif(
     not os.environ.get("BLENDER"),
     reason="BLENDER is not set: it is the command line of the Blender executable to test in",
 )
-ROOT = Path(package.ROOT)
-WIDTH, HEIGHT = 64, 48
 # Mean relative error that 2x2 patches a face and 256 samples may leave; 0.02 was measured.
 TOLERANCE = 0.05
-# A display of its own, on which a true ESC is pressed once $ESCAPE is a file: what stops a render
-# is the keyboard itself, Blender's simulated events do not.
-DISPLAY = """
-(until [ -e "$ESCAPE" ]; do sleep 0.1; done; xdotool key Escape) >/dev/null 2>&1 &
-"$@"
-code=$?
-kill $!
-exit $code
-"""
 BATCH = "import bpy; bpy.ops.arto.capture(); bpy.ops.arto.fit(); bpy.ops.arto.relight()"
-
-MAKE_SCENE = f"""
-import sys
-sys.path.insert(0, {str(ROOT)!r})
-import bpy
-from bench import scenes, worlds
-
-path, camera = sys.argv[-2:]
-scene = scenes.product_shot(width={WIDTH}, height={HEIGHT})
-bpy.data.objects.remove(bpy.data.objects["bottle"])  # its caustics would need many samples
-worlds.set_world_hdri(scene, "sunset")
-bpy.ops.preferences.addon_enable(module="bl_ext.user_default.arto")
-scene.arto.patches = 2
-scene.arto.samples = 256
-if camera == "none":
-    bpy.data.objects.remove(scene.camera)
-bpy.ops.wm.save_as_mainfile(filepath=path)
-if camera != "none":
-    settings = scene.render.image_settings
-    settings.file_format, settings.color_depth = "OPEN_EXR", "32"
-    scene.render.filepath = path + ".reference.exr"
-    scene.cycles.samples = 256
-    bpy.ops.render.render(write_still=True)
-"""
-
-
-class Program:
-    """Blender with the extension installed, and its user's files in `home`."""
-
-    def __init__(self, home: Path) -> None:
-        self.home = home
-        self.environment = {**os.environ, "BLENDER_USER_RESOURCES": str(home)}
-        self.command = shlex.split(os.environ["BLENDER"])
-
-    def run(
-        self, *arguments: str | Path, escape: Path | None = None
-    ) -> subprocess.CompletedProcess[str]:
-        """Run it to its end; with `escape` in its window, and ESC is pressed when that appears."""
-        line = [*self.command, *map(str, arguments)]
-        environment = self.environment
-        if escape:
-            screen = ["xvfb-run", "-a", "-s", "-screen 0 1600x900x24"]
-            line = [*screen, "bash", "-c", DISPLAY, "-", *line]
-            environment = {**environment, "ESCAPE": str(escape)}
-        return subprocess.run(
-            line, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=120
-        )
-
-    def script(self, text: str, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
-        """Run a script in it, without a window; it must succeed."""
-        done = self.run("-b", "--python-exit-code", "1", "--python-expr", text, "--", *arguments)
-        assert done.returncode == 0, said(done)
-        return done
-
-
-def said(done: subprocess.CompletedProcess[str]) -> str:
-    return f"exit code {done.returncode}\n{done.stdout}\n{done.stderr}"
-
-
-@pytest.fixture(scope="session")
-def program(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Program]:
-    home = tmp_path_factory.mktemp("blender")
-    out = Program(home)
-    zipped = package.build(only_here=True)
-    install = ("--command", "extension", "install-file", "-r", "user_default", "--enable", zipped)
-    done = out.run(*install)
-    assert 'Installed "arto"' in done.stdout, said(done)
-    yield out
-    shutil.rmtree(home, ignore_errors=True)
-
-
-@pytest.fixture(scope="session")
-def made(program: Program, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with scene.blend and what Cycles itself shows of it."""
-    folder = tmp_path_factory.mktemp("made")
-    program.script(MAKE_SCENE, folder / "scene.blend", "camera")
-    return folder
 
 
 @pytest.fixture

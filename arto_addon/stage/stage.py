@@ -67,6 +67,7 @@ def stage(scene: bpy.types.Scene, view_layer: str) -> Iterator[Stage]:
             if layer.name != view_layer:
                 copy.view_layers.remove(layer)
         layer = copy.view_layers[0]
+        layer.use = True  # it is the one that was asked for, whatever F12 renders
         for prop in layer.bl_rna.properties:
             if prop.identifier.startswith("use_pass_"):
                 setattr(layer, prop.identifier, prop.identifier in _KEEP_PASSES)

@@ -1,0 +1,32 @@
+"""The real program, set up once for all tests that need it."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from program_tools import MAKE_SCENE, Program, said
+
+from tools import package
+
+
+@pytest.fixture(scope="session")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Program]:
+    home = tmp_path_factory.mktemp("blender")
+    out = Program(home)
+    zipped = package.build(only_here=True)
+    install = ("--command", "extension", "install-file", "-r", "user_default", "--enable", zipped)
+    done = out.run(*install)
+    assert 'Installed "arto"' in done.stdout, said(done)
+    yield out
+    shutil.rmtree(home, ignore_errors=True)
+
+
+@pytest.fixture(scope="session")
+def made(program: Program, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with scene.blend and what Cycles itself shows of it."""
+    folder = tmp_path_factory.mktemp("made")
+    program.script(MAKE_SCENE, folder / "scene.blend", "camera")
+    return folder

@@ -1,0 +1,79 @@
+"""The real program for tests: Blender with the extension installed, with its window or without."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import subprocess
+from pathlib import Path
+
+from tools import package
+
+ROOT = Path(package.ROOT)
+WIDTH, HEIGHT = 64, 48
+# A display of its own, on which a true ESC is pressed once $ESCAPE is a file: what stops a render
+# is the keyboard itself, Blender's simulated events do not.
+DISPLAY = """
+(until [ -e "$ESCAPE" ]; do sleep 0.1; done; xdotool key Escape) >/dev/null 2>&1 &
+"$@"
+code=$?
+kill $!
+exit $code
+"""
+
+MAKE_SCENE = f"""
+import sys
+sys.path.insert(0, {str(ROOT)!r})
+import bpy
+from bench import scenes, worlds
+
+path, camera = sys.argv[-2:]
+scene = scenes.product_shot(width={WIDTH}, height={HEIGHT})
+bpy.data.objects.remove(bpy.data.objects["bottle"])  # its caustics would need many samples
+worlds.set_world_hdri(scene, "sunset")
+bpy.ops.preferences.addon_enable(module="bl_ext.user_default.arto")
+scene.arto.patches = 2
+scene.arto.samples = 256
+if camera == "none":
+    bpy.data.objects.remove(scene.camera)
+bpy.ops.wm.save_as_mainfile(filepath=path)
+if camera != "none":
+    settings = scene.render.image_settings
+    settings.file_format, settings.color_depth = "OPEN_EXR", "32"
+    scene.render.filepath = path + ".reference.exr"
+    scene.cycles.samples = 256
+    bpy.ops.render.render(write_still=True)
+"""
+
+
+class Program:
+    """Blender with the extension installed, and its user's files in `home`."""
+
+    def __init__(self, home: Path) -> None:
+        self.home = home
+        self.environment = {**os.environ, "BLENDER_USER_RESOURCES": str(home)}
+        self.command = shlex.split(os.environ["BLENDER"])
+
+    def run(
+        self, *arguments: str | Path, escape: Path | None = None
+    ) -> subprocess.CompletedProcess[str]:
+        """Run it to its end; with `escape` in its window, and ESC is pressed when that appears."""
+        line = [*self.command, *map(str, arguments)]
+        environment = self.environment
+        if escape:
+            screen = ["xvfb-run", "-a", "-s", "-screen 0 1600x900x24"]
+            line = [*screen, "bash", "-c", DISPLAY, "-", *line]
+            environment = {**environment, "ESCAPE": str(escape)}
+        return subprocess.run(
+            line, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=120
+        )
+
+    def script(self, text: str, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
+        """Run a script in it, without a window; it must succeed."""
+        done = self.run("-b", "--python-exit-code", "1", "--python-expr", text, "--", *arguments)
+        assert done.returncode == 0, said(done)
+        return done
+
+
+def said(done: subprocess.CompletedProcess[str]) -> str:
+    return f"exit code {done.returncode}\n{done.stdout}\n{done.stderr}"

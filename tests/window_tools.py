@@ -1,0 +1,208 @@
+"""Blender's window for tests: real keys and a real mouse on a display of its own.
+
+A test tells the window what to look at in Python, one request after the other, and an artist's
+gestures come from the keyboard. Some keys are bound to ARTO's buttons, and call them as a click
+does.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from program_tools import ROOT, Program
+
+BUTTONS = {"capture": "F5", "fit": "F6", "relight": "F7", "build_hemicube": "F8"}
+
+# Runs in the window: takes requests from a folder, answers there.
+DRIVER = """
+import json, os, sys, traceback
+import bpy
+
+folder, buttons = sys.argv[-2], json.loads(sys.argv[-1])
+session = next(m for n, m in sys.modules.items() if n.endswith(".arto_addon.job.session"))
+status = next(m for n, m in sys.modules.items() if n.endswith(".arto_addon.shot.status"))
+paths = next(m for n, m in sys.modules.items() if n.endswith(".arto_addon.shot.paths"))
+names = {"bpy": bpy, "session": session, "status": status, "paths": paths, "at": [0]}
+
+
+def answer():
+    path = os.path.join(folder, f"ask{names['at'][0]}.py")
+    if not os.path.exists(path):
+        return 0.02
+    try:
+        with open(path) as f:
+            kind, code = f.read().split("\\n", 1)
+        window = bpy.context.window_manager.windows[0]
+        area = next((a for a in window.screen.areas if a.type == "VIEW_3D"), None)
+        with bpy.context.temp_override(window=window, area=area):
+            if kind == "eval":
+                out = {"value": eval(code, names)}
+            else:
+                exec(code, names)
+                out = {"value": None}
+    except BaseException:
+        out = {"error": traceback.format_exc()}
+    partial = os.path.join(folder, "answer.part")
+    with open(partial, "w") as f:
+        json.dump(out, f, default=str)
+    os.replace(partial, os.path.join(folder, f"answer{names['at'][0]}.json"))
+    names["at"][0] += 1
+    return 0.02
+
+
+keymap = bpy.context.window_manager.keyconfigs.addon.keymaps.new(name="Window", space_type="EMPTY")
+for operator, key in buttons.items():
+    keymap.keymap_items.new("arto." + operator, key, "PRESS")
+bpy.app.timers.register(answer, first_interval=0.5, persistent=True)
+"""
+
+
+class Window:
+    """A Blender with its window."""
+
+    def __init__(self, program: Program, folder: Path, blend: Path | None, display: str) -> None:
+        self.folder = folder / f"window{time.monotonic_ns()}"
+        self.folder.mkdir()
+        self.display = display
+        self.asked = 0
+        self.log = self.folder / "log.txt"
+        (self.folder / "driver.py").write_text(DRIVER)
+        line = [*program.command, "-p", "0", "0", "1600", "900"]
+        line += [str(blend)] if blend else []
+        line += ["--python-expr", "import bpy; bpy.context.preferences.view.show_splash = False"]
+        line += ["--python", str(self.folder / "driver.py"), "--"]
+        line += [str(self.folder), json.dumps(BUTTONS)]
+        environment = {**program.environment, "DISPLAY": display}
+        with self.log.open("w") as log:
+            self.process = subprocess.Popen(
+                line, cwd=ROOT, env=environment, stdout=log, stderr=subprocess.STDOUT
+            )
+        self.do("pass", 40)
+        self.point(700, 400)
+
+    def _ask(self, kind: str, code: str, seconds: float) -> Any:
+        path = self.folder / f"ask{self.asked}.py"
+        partial = path.with_suffix(".part")
+        partial.write_text(f"{kind}\n{code}")
+        partial.replace(path)
+        answer = self.folder / f"answer{self.asked}.json"
+        self.asked += 1
+        until = time.monotonic() + seconds
+        while not answer.exists():
+            assert self.process.poll() is None, f"Blender ended\n{self.log.read_text()[-3000:]}"
+            assert time.monotonic() < until, f"no answer to {code}\n{self.log.read_text()[-3000:]}"
+            time.sleep(0.02)
+        out = json.loads(answer.read_text())
+        assert "error" not in out, out["error"]
+        return out["value"]
+
+    def do(self, code: str, seconds: float = 20) -> None:
+        """Run Python in the window."""
+        self._ask("exec", code, seconds)
+
+    def get(self, expression: str, seconds: float = 20) -> Any:
+        """The value of a Python expression in the window."""
+        return self._ask("eval", expression, seconds)
+
+    def wait(self, expression: str, seconds: float = 40) -> Any:
+        """Wait until an expression is true; its value."""
+        until = time.monotonic() + seconds
+        while not (value := self.get(expression)):
+            assert time.monotonic() < until, f"{expression}\n{self.log.read_text()[-3000:]}"
+            time.sleep(0.05)
+        return value
+
+    def _xdotool(self, *arguments: str) -> None:
+        environment = {**os.environ, "DISPLAY": self.display}
+        subprocess.run(["xdotool", *arguments], env=environment, check=True, capture_output=True)
+
+    def point(self, x: int, y: int) -> None:
+        """Move the mouse."""
+        self._xdotool("mousemove", str(x), str(y))
+        time.sleep(0.1)
+
+    def click(self, x: int, y: int) -> None:
+        self.point(x, y)
+        self._xdotool("click", "1")
+        time.sleep(0.1)
+
+    def key(self, *keys: str) -> None:
+        """Press keys, `ctrl+z` for one."""
+        for key in keys:
+            self._xdotool("key", key)
+            time.sleep(0.15)
+
+    def press(self, button: str) -> None:
+        """Call one of ARTO's operators as its button does."""
+        self.key(BUTTONS[button])
+
+    def idle(self, seconds: float = 60) -> list[str]:
+        """Wait until no job runs -> how the last one ended: level and text."""
+        self.wait("session.current is None and session.outcome is not None", seconds)
+        return self.get("[session.outcome.level, session.outcome.text]")
+
+    def children(self) -> list[int]:
+        """The processes of jobs of this window."""
+        found = self.get("session.current.process.pid if session.current else 0")
+        return [found] if found else []
+
+    @property
+    def alive(self) -> bool:
+        return self.process.poll() is None
+
+    def quit(self) -> str:
+        """End it from inside, as Ctrl+Q without unsaved changes does -> what it printed."""
+        path = self.folder / f"ask{self.asked}.py"
+        path.write_text("exec\nbpy.app.timers.register(bpy.ops.wm.quit_blender)")
+        self.process.wait(30)
+        return self.printed
+
+    def kill(self) -> None:
+        self.process.send_signal(signal.SIGKILL)
+        self.process.wait(10)
+
+    @property
+    def printed(self) -> str:
+        return self.log.read_text()
+
+
+@contextmanager
+def windows(program: Program, folder: Path) -> Iterator[Any]:
+    """A display; called, it opens a window on it with a .blend."""
+    for tool in ("Xvfb", "xdotool"):
+        if not shutil.which(tool):
+            pytest.skip(f"{tool} is not installed: the window needs it")
+    read, write = os.pipe()
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(write), "-screen", "0", "1600x900x24", "-noreset"],
+        pass_fds=[write],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(write)
+    with os.fdopen(read) as numbers:  # to its end: it may be written in two parts
+        display = ":" + numbers.readline().strip()
+    opened: list[Window] = []
+
+    def open_window(blend: Path | None = None) -> Window:
+        opened.append(Window(program, folder, blend, display))
+        return opened[-1]
+
+    try:
+        yield open_window
+    finally:
+        for window in opened:
+            if window.alive:
+                window.kill()
+        server.terminate()
+        server.wait(10)
