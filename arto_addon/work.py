@@ -48,22 +48,26 @@ class Render:
 Steps = Generator[Progress | Render, None, Any]
 
 
+def _last_properties() -> Any:
+    # asked for each time: Blender replaces them by others
+    return bpy.context.window_manager.operator_properties_last("render.render")
+
+
 @contextmanager
 def last_properties_kept() -> Iterator[None]:
     """Blender gives the next F12 what the last render was called with: it gets back what it had."""
-    last = bpy.context.window_manager.operator_properties_last("render.render")
-    names = (
-        [] if last is None else [p.identifier for p in last.bl_rna.properties if not p.is_readonly]
-    )
-    before = {n: getattr(last, n) if last.is_property_set(n) else None for n in names}
+    last = _last_properties()
+    names = [p.identifier for p in last.bl_rna.properties if not p.is_readonly] if last else []
+    before = {n: getattr(last, n) for n in names if last.is_property_set(n)}
     try:
         yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                last.property_unset(name)
+        last = _last_properties()
+        for name in names:
+            if name in before:
+                setattr(last, name, before[name])
             else:
-                setattr(last, name, value)
+                last.property_unset(name)
 
 
 def blocking_render(request: Render) -> None:

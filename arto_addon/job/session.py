@@ -235,12 +235,13 @@ def _in_the_middle() -> bool:
 
 
 def _show_share(job: Job | None) -> None:
+    text = None
+    if job:
+        text = f"ARTO is {DOING[job.verb]}: {job.state.share:.0%} {job.line}   (ESC: cancel)"
     for window in bpy.context.window_manager.windows:
-        window.workspace.status_text_set(
-            f"ARTO is {DOING[job.verb]}: {job.state.share:.0%} {job.line}   (ESC: cancel)"
-            if job
-            else None
-        )
+        # a timer has no window of its own after a file was opened, and Blender asks for one here
+        with bpy.context.temp_override(window=window):
+            window.workspace.status_text_set(text)
 
 
 def end() -> None:

@@ -15,9 +15,6 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...core.errors import ArtoError
-from . import home
-
 _DEPTH = 12
 
 
@@ -295,7 +292,8 @@ def file(path: str, library: bpy.types.Library | None, then: str = "", full: boo
     if not path:
         return "none"
     try:
-        there = home.absolute(path, library)
+        # by the file that is open: in a copy, Blender has turned the paths of data-blocks
+        there = Path(bpy.path.abspath(path, library=library))
         stat = there.stat()
         size, at = stat.st_size, stat.st_mtime_ns
         was = then.split(":")
@@ -309,6 +307,6 @@ def file(path: str, library: bpy.types.Library | None, then: str = "", full: boo
                 _contents[key] = hashlib.file_digest(
                     f, lambda: hashlib.blake2b(digest_size=12)
                 ).hexdigest()
-    except (OSError, ArtoError) as e:  # it is not there: that is its state
+    except OSError as e:  # it is not there: that is its state
         return f"{Path(path).name} {type(e).__name__}"
     return then if touched and was[2] == _contents[key] else f"{size}:{at}:{_contents[key]}"

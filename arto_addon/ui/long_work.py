@@ -8,6 +8,7 @@ artist could do meanwhile reaches the data-blocks that it works on, because noth
 from __future__ import annotations
 
 import time
+from contextlib import ExitStack
 
 import bpy
 
@@ -69,6 +70,7 @@ class LongWork(bpy.types.Operator):
 
     def _lock(self, context: bpy.types.Context, steps: Steps) -> set[str]:
         self._steps = steps
+        self._lent = ExitStack()
         self._waiting = None
         bpy.app.handlers.render_complete.append(self._on_complete)
         bpy.app.handlers.render_cancel.append(self._on_cancel)
@@ -88,7 +90,12 @@ class LongWork(bpy.types.Operator):
         self._ended(scene, "cancelled")
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        rendering = bpy.app.is_job_running("RENDER")
+        # until Blender's operator is gone too: it leaves its properties to the next F12 as it goes
+        rendering = bpy.app.is_job_running("RENDER") or any(
+            o.bl_idname == "RENDER_OT_render"
+            for w in context.window_manager.windows
+            for o in w.modal_operators
+        )
         if event.type == "ESC" and not rendering:
             return self._quit(context, "WARNING", "cancelled")
         if event.type != "TIMER":
@@ -100,6 +107,7 @@ class LongWork(bpy.types.Operator):
                 # it is over and nobody said how
                 self._waiting.state = "cancelled"
         self._waiting = None
+        self._lent.close()
         until = time.perf_counter() + SECONDS_A_TICK
         try:
             step = next(self._steps)
@@ -127,8 +135,8 @@ class LongWork(bpy.types.Operator):
         try:
             # for the moment in which Blender opens its window: none for each tile
             view.render_display_type = "NONE"
-            with last_properties_kept():
-                begun = bpy.ops.render.render("INVOKE_DEFAULT", write_still=True, scene=step.scene)
+            self._lent.enter_context(last_properties_kept())
+            begun = bpy.ops.render.render("INVOKE_DEFAULT", write_still=True, scene=step.scene)
         finally:
             view.render_display_type = display
             context.preferences.is_dirty = dirty
@@ -146,6 +154,7 @@ class LongWork(bpy.types.Operator):
     def _quit(self, context: bpy.types.Context, level: str, text: str) -> set[str]:
         """The only way out."""
         self._steps.close()
+        self._lent.close()
         bpy.app.handlers.render_complete.remove(self._on_complete)
         bpy.app.handlers.render_cancel.remove(self._on_cancel)
         context.window_manager.event_timer_remove(self._timer)

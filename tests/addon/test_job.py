@@ -1,0 +1,130 @@
+"""The snapshot has all that is in memory, and its paths lead to the same files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from arto.arto_addon.job import run, snapshot
+from arto.arto_addon.job.task import State, Task, clock
+from arto.arto_addon.shot import home
+from arto.arto_addon.shot.fingerprint import changes, fingerprint
+from arto.core.errors import ArtoError
+from scene_tools import add_mesh, small_scene
+
+
+@pytest.fixture
+def back():
+    """Forget afterwards that this process worked on a copy."""
+    yield
+    home._home.clear()
+
+
+def textured(folder: Path, name: str, image: bpy.types.Image) -> None:
+    tree = bpy.data.materials[name].node_tree
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image = image
+    tree.links.new(texture.outputs[0], tree.nodes["Principled BSDF"].inputs["Base Color"])
+
+
+def scene_with_files(folder: Path) -> bpy.types.Scene:
+    """An image and an IES lamp by relative paths, a linked library, painted and packed pixels."""
+    shots = folder / "shots"
+    (folder / "textures").mkdir(parents=True)
+    shots.mkdir()
+    small_scene(folder)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "library.blend"))
+    scene = small_scene(folder)
+    scene.arto.folder = "//arto/"
+    bpy.ops.wm.save_as_mainfile(filepath=str(shots / "shot.blend"))
+    for name in ("plain", "packed", "painted"):
+        image = bpy.data.images.new(name, 2, 2)
+        image.pixels.foreach_set(np.linspace(0, 1, 16, dtype=np.float32))
+        image.filepath_raw, image.file_format = str(folder / "textures" / f"{name}.png"), "PNG"
+        image.save()
+        image.filepath = f"//../textures/{name}.png"
+    bpy.data.images["packed"].pack()
+    textured(folder, "Matt", bpy.data.images["plain"])
+    textured(folder, "Glossy", bpy.data.images["painted"])
+    textured(folder, "Floor", bpy.data.images["packed"])
+    with bpy.data.libraries.load("//../library.blend", link=True, relative=True) as (_, wanted):
+        wanted.meshes = ["Matt"]
+    linked = bpy.data.objects.new("Linked", wanted.meshes[0])
+    scene.collection.objects.link(linked)
+    (folder / "lamp.ies").write_text("IESNA:LM-63-1995\nTILT=NONE\n")
+    lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
+    lamp.data.use_nodes = True
+    ies = lamp.data.node_tree.nodes.new("ShaderNodeTexIES")
+    ies.mode, ies.filepath = "EXTERNAL", "//../lamp.ies"
+    scene.collection.objects.link(lamp)
+    bpy.ops.wm.save_mainfile()
+    # what follows is in memory only
+    add_mesh(scene, "Unsaved", [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)])
+    bpy.data.images["painted"].pixels.foreach_set(np.full(16, 0.5, np.float32))
+    bpy.data.images["painted"].update()
+    bpy.context.view_layer.update()
+    return scene
+
+
+def test_snapshot_is_what_is_in_memory(tmp_path, back):
+    scene = scene_with_files(tmp_path)
+    saved = (tmp_path / "shots" / "shot.blend").read_bytes()
+    before = fingerprint(scene, "ViewLayer", full=True)
+    folder = tmp_path / "elsewhere" / "deep" / "job"
+    folder.mkdir(parents=True)
+    blend, task = snapshot.take(folder, "capture", scene, "ViewLayer")
+    # the artist's file is what it was
+    assert (tmp_path / "shots" / "shot.blend").read_bytes() == saved
+    assert bpy.data.filepath == str(tmp_path / "shots" / "shot.blend")
+    assert bpy.data.images["painted"].is_dirty and not bpy.data.use_autopack
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    run._steps(Task.read(task), folder).close()
+    scene = bpy.context.scene
+    bpy.context.view_layer.update()
+    assert changes(before, fingerprint(scene, "ViewLayer", full=True)) == []
+    np.testing.assert_allclose(bpy.data.images["painted"].pixels[:], 0.5, atol=0.01)
+    files = [(i.filepath, i.library) for i in bpy.data.images if i.source == "FILE"]
+    files += [(x.filepath, None) for x in bpy.data.libraries]
+    files += [(n.filepath, None) for n in bpy.data.lights["Lamp"].node_tree.nodes
+              if n.bl_idname == "ShaderNodeTexIES"]  # fmt: skip
+    assert len(files) == 5
+    for path, library in files:
+        assert Path(bpy.path.abspath(path, library=library)).is_file(), path
+    # and what is by a path of the artist's goes where it would
+    assert home.absolute(scene.arto.folder) == tmp_path / "shots" / "arto"
+
+
+def test_caches_beside_the_file_are_there(tmp_path, back):
+    scene = scene_with_files(tmp_path)
+    caches = tmp_path / "shots" / "blendcache_shot"
+    caches.mkdir()
+    (caches / "cloth_000001.bphys").write_text("x")
+    folder = tmp_path / "job"
+    folder.mkdir()
+    snapshot.take(folder, "capture", scene, "ViewLayer")
+    assert (folder / "blendcache_shot" / "cloth_000001.bphys").read_text() == "x"
+
+
+def test_a_task_and_a_state_come_back(tmp_path):
+    task = Task("fit", "Scene", "ViewLayer", "/a/b.blend", {"kind": "NONE", "use": {"CPU": True}})
+    assert Task.read(task.write(tmp_path)) == task
+    state = State(0.5, "text", 3.0, 4.0)
+    state.write(tmp_path)
+    assert State.read(tmp_path) == state
+    (tmp_path / "progress.json").write_text("{")
+    assert State.read(tmp_path) == State()
+    for text in ("{", "[]", "{}", '{"painted": [{"no": 1}]}'):
+        (tmp_path / "task.json").write_text(text)
+        with pytest.raises(ArtoError, match="no task"):
+            Task.read(tmp_path / "task.json")
+
+
+def test_times_in_few_words():
+    assert [clock(s) for s in (0.4, 59.6, 200, 7500)] == [
+        "0 s",
+        "1 min 0 s",
+        "3 min 20 s",
+        "2 h 5 min",
+    ]
