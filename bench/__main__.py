@@ -128,6 +128,16 @@ def _patterns(options: argparse.Namespace) -> None:
         print(f"| `{s.name}` | {len(s)} | {s.rank} | {s.condition:.1f} | {', '.join(told)} |")
 
 
+def _snapshot(options: argparse.Namespace) -> None:
+    from .machine import write_rows
+    from .snapshot import snapshot, table
+
+    rows = snapshot(options.megabytes)
+    if options.json:
+        write_rows(options.json, rows)
+    print(table(rows))
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
@@ -195,6 +205,11 @@ def main() -> int:
     c.add_argument("--samples", type=int, default=8192)
     c.add_argument("--many", type=int, default=2048)
     c.set_defaults(run=_colour)
+
+    c = commands.add_parser("snapshot", help="what starting a job costs the window")
+    c.add_argument("--json", type=Path)
+    c.add_argument("--megabytes", type=int, nargs="+", default=[0, 100, 1000])
+    c.set_defaults(run=_snapshot)
 
     c = commands.add_parser("patterns", help="what each set of patterns can identify")
     c.set_defaults(run=_patterns)
