@@ -53,7 +53,7 @@ def is_of_another(scene: bpy.types.Scene, view_layer: str | None = None) -> bool
 
 
 def unfinished(folder: Path) -> list[str]:
-    """The captures in a shot's folder that were stopped, the newest first: `2 of 7 tiles, ...`."""
+    """The captures in a shot's folder that were stopped, the newest first: `2 of 7 tiles`."""
     found = []
     for path in folder.glob("unfinished-*/" + capture_set.HEADER):
         try:
@@ -63,8 +63,7 @@ def unfinished(folder: Path) -> list[str]:
         if there:
             tiles = there.head["tiles"]
             done = sum(bool(t["done"]) for t in tiles)
-            text = f"{done} of {len(tiles)} tiles, {there.head.get('samples')} samples"
-            found.append((path.stat().st_mtime_ns, text))
+            found.append((path.stat().st_mtime_ns, f"{done} of {len(tiles)} tiles"))
     return [text for _, text in sorted(found, reverse=True)]
 
 

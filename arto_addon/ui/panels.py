@@ -77,7 +77,7 @@ class ARTO_PT_main(_Panel, bpy.types.Panel):
         """What runs, or how the last piece of work ended."""
         if job := session.current:
             column.separator()
-            column.label(text=session.busy())
+            column.label(text=f"{job.state.text[0].upper()}{job.state.text[1:]}")
             row = column.row(align=True)
             row.progress(factor=job.state.share, text=job.line)
             row.operator("arto.cancel", text="", icon="X")
