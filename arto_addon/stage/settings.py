@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import bpy
 
-from ..blender.output import float_exr
 from .stage import Stage
 
 
@@ -40,4 +39,3 @@ def prepare(on: Stage, layers: int) -> None:
     world.node_tree.nodes.clear()
     on.changed["world"] = [on.scene.world.name if on.scene.world else None, None]
     on.scene.world = world
-    float_exr(on.scene.render)
