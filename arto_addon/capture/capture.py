@@ -16,6 +16,7 @@ from ...core.files import Lock, whole
 from ...core.hemicube import Hemicube
 from ...core.patterns import PatternSet, pattern_set
 from ...core.region import Region
+from ..blender.output import write_to
 from ..shot import home, paths
 from ..shot.fingerprint import fingerprint, key_of
 from ..shot.shot import shot_of
@@ -180,7 +181,7 @@ def _render(
 ) -> Steps:
     """One render of some basis images into `path`."""
     with whole(path) as partial:
-        on.scene.render.filepath = str(partial)
+        write_to(on.scene.render, partial)
         with planes.lit(on, hemicube, patterns, images):
             yield request
             request.check()

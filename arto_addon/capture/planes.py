@@ -82,8 +82,12 @@ def _grain(nodes: Nodes) -> Any:
     return nodes.math("GREATER_THAN", noise.outputs["Value"], 0.5)
 
 
-def pattern_material(name: str, patterns: PatternSet, opaque: bool) -> Any:
-    """Emission of a pattern of the set (or of `GRAIN`), plus what lies behind."""
+def pattern_material(name: str, patterns: PatternSet) -> Any:
+    """Emission of a pattern of the set (or of `GRAIN`), plus what lies behind.
+
+    What lies behind the last of them is the background, and that is where Cycles adds the sun lamps
+    of the scene to rays that were scattered: an opaque patch would take away their mirror images.
+    """
     material = bpy.data.materials.new(f"ARTO {name}")
     # paths find the patches; no shadow ray is ever cast at them, so Cycles' limit of 255 light
     # groups for sampled lights does not apply
@@ -96,11 +100,10 @@ def pattern_material(name: str, patterns: PatternSet, opaque: bool) -> Any:
     else:
         row = patterns.coefficients[patterns.patterns.index(name)]
         radiance = _polynomial(nodes, row)
-    shader = nodes.add("ShaderNodeEmission", (1, 1, 1, 1), radiance).outputs[0]
-    if not opaque:
-        behind = nodes.add("ShaderNodeBsdfTransparent").outputs[0]
-        shader = nodes.add("ShaderNodeAddShader", shader, behind).outputs[0]
-    nodes.add("ShaderNodeOutputMaterial", shader)
+    light = nodes.add("ShaderNodeEmission", (1, 1, 1, 1), radiance).outputs[0]
+    behind = nodes.add("ShaderNodeBsdfTransparent").outputs[0]
+    both = nodes.add("ShaderNodeAddShader", light, behind).outputs[0]
+    nodes.add("ShaderNodeOutputMaterial", both)
     return material
 
 
@@ -133,9 +136,7 @@ def build(
     """
     images = list(images)
     used = list(dict.fromkeys(name for _, name in images))
-    materials = {
-        name: made(pattern_material(name, patterns, opaque=name == used[-1])) for name in used
-    }
+    materials = {name: made(pattern_material(name, patterns)) for name in used}
     centre = np.array(hemicube.centre)
     for k, pattern in images:
         name = group_name(k, pattern)

@@ -15,6 +15,7 @@ from ...core.errors import CaptureSetError
 from ...core.hemicube import FINEST, Hemicube
 from ...core.patterns import pattern_set
 from ...core.refine import check, refine
+from ..blender.output import write_to
 from ..stage.stage import Stage, picture_region, picture_size
 from ..work import Render, Steps
 from . import planes
@@ -59,7 +60,7 @@ def refined(on: Stage, hemicube: Hemicube, most: int) -> Steps:
             render.use_crop_to_border = render.use_border
             cycles.samples = SAMPLES
             path = Path(folder) / "probe.exr"
-            render.filepath = str(path)
+            write_to(render, path)
             with planes.lit(on, fine, patterns, images):
                 request = Render(scene.name, 0, f"probing {len(fine)} directions")
                 yield request

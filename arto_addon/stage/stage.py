@@ -15,6 +15,7 @@ import bpy
 
 from ...core.errors import SceneError
 from ...core.region import Region
+from ..blender.output import float_exr
 
 # What carries light out of a render besides Combined and is of no use here.
 _KEEP_PASSES = {"use_pass_combined", "use_pass_z"}
@@ -80,12 +81,7 @@ def stage(scene: bpy.types.Scene, view_layer: str) -> Iterator[Stage]:
         while layer.lightgroups:
             layer.lightgroups.remove(layer.lightgroups[0])
         copy.render.use_compositing = False
-        copy.render.use_sequencer = False
-        copy.render.use_multiview = False
-        copy.render.use_overwrite = True
-        copy.render.use_placeholder = False
-        copy.render.use_file_extension = False
-        copy.render.use_freestyle = False
+        float_exr(copy.render)
         yield out
     finally:
         out.clear()

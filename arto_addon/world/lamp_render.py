@@ -19,6 +19,7 @@ from ...core.environment import Environment
 from ...core.errors import SceneError
 from ...core.field import Field
 from ...core.region import Region
+from ..blender.output import write_to
 from ..stage.settings import prepare
 from ..stage.stage import Stage, set_region, stage
 from ..work import Render, Steps
@@ -80,7 +81,7 @@ def lamp_light(
         on.scene.view_layers[0].lightgroups.add(name=GROUP)
         set_region(on.scene, region)
         path = Path(folder) / "lamps.exr"
-        on.scene.render.filepath = str(path)
+        write_to(on.scene.render, path)
         request = Render(on.scene.name, share, "rendering the world's lamps")
         yield request
         request.check()
