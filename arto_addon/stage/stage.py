@@ -55,6 +55,31 @@ class Stage:
         bpy.data.batch_remove([*self._made, self.scene])
 
 
+def _hold_still(out: Stage) -> None:
+    """Take the animation off the scene's settings: they stay as they are at this frame.
+
+    A key or a driver is asked again when the render begins, and would overrule what is set here.
+    The scene's custom properties keep theirs: drivers of objects read them.
+    """
+    animation = out.scene.animation_data
+    if animation is None:
+        return
+    while animation.nla_tracks:
+        animation.nla_tracks.remove(animation.nla_tracks[0])
+    for driver in list(animation.drivers):
+        if not driver.data_path.startswith('["'):
+            animation.drivers.remove(driver)
+    if animation.action is None:
+        return
+    animation.action = out.made(animation.action.copy())
+    for layer in animation.action.layers:
+        for strip in layer.strips:
+            for bag in strip.channelbags:
+                for curve in list(bag.fcurves):
+                    if not curve.data_path.startswith('["'):
+                        bag.fcurves.remove(curve)
+
+
 @contextmanager
 def stage(scene: bpy.types.Scene, view_layer: str) -> Iterator[Stage]:
     """A copy of `scene` with only `view_layer` in use, without compositing and extra passes."""
@@ -63,6 +88,7 @@ def stage(scene: bpy.types.Scene, view_layer: str) -> Iterator[Stage]:
     copy = scene.copy()
     out = Stage(copy)
     try:
+        _hold_still(out)
         copy.frame_set(scene.frame_current, subframe=scene.frame_subframe)
         for layer in list(copy.view_layers):
             if layer.name != view_layer:
