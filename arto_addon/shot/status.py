@@ -110,6 +110,14 @@ def unfinished_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Li
     return (f"and unfinished: {'; '.join(stopped)}", False) if stopped else None
 
 
+def caution_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line | None:
+    """What the check of the light found before the capture; None for nothing."""
+    place = _place(scene, view_layer)
+    there = _capture_set(place) if place and not place.owner else None
+    caution = there.head.get("caution") if isinstance(there, CaptureSet) else None
+    return (str(caution["text"]), False) if isinstance(caution, dict) else None
+
+
 def _capture_set(place: Place) -> CaptureSet | Line | None:
     try:
         there = _opened(CaptureSet, place.source / "capture" / capture_set.HEADER, unfinished=True)

@@ -54,6 +54,7 @@ class ARTO_PT_main(_Panel, bpy.types.Panel):
         column.prop(settings, "samples")
         column.operator("arto.capture", icon="RENDER_STILL")
         _line(column, status.capture_line(context.scene))
+        _line(column, status.caution_line(context.scene))
         if stopped := status.unfinished_line(context.scene):
             row = column.row(align=True)
             _line(row, stopped)
