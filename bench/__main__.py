@@ -138,6 +138,12 @@ def _snapshot(options: argparse.Namespace) -> None:
     print(table(rows))
 
 
+def _settings(options: argparse.Namespace) -> None:
+    from .settings import run, table
+
+    print(table(run(options.json, options.part, options.seed, options.only)))
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
@@ -210,6 +216,13 @@ def main() -> int:
     c.add_argument("--json", type=Path)
     c.add_argument("--megabytes", type=int, nargs="+", default=[0, 100, 1000])
     c.set_defaults(run=_snapshot)
+
+    c = commands.add_parser("settings", help="every setting of a scene against Cycles")
+    c.add_argument("--json", type=Path)
+    c.add_argument("--part", type=float, default=1.0, help="a random share of them, 0 to 1")
+    c.add_argument("--seed", type=int, default=0, help="which share")
+    c.add_argument("--only", nargs="+", help="owners, or owner.setting")
+    c.set_defaults(run=_settings)
 
     c = commands.add_parser("patterns", help="what each set of patterns can identify")
     c.set_defaults(run=_patterns)
