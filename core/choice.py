@@ -6,7 +6,8 @@ light paths an entry had is known from the capture's grain, and decides how its 
 - A *box* must be shown. Its spread must explain the moments better than a linear density's by more
   than two parameters would by chance: Akaike's criterion with the correction for few samples
   (AICc). Two points in a patch are no evidence of a narrow support, however often one was hit.
-- The *whole patch* must be shown too: that the light's mean is its middle, to `CENTRED`. A mean
+- The *whole patch* must be shown too: that the light's mean is where a uniform
+  transport's is (which is not the middle: `measure`), to `CENTRED`. A mean
   that is not known is kept as it is, in the linear projection. That is noise, but unbiased noise,
   which averages out over pixels and can be denoised; a mean rounded to the middle stays wrong.
 - Enough evidence still does not make a box the better filter. A reflection that is narrow both ways
@@ -23,14 +24,15 @@ from numpy.typing import NDArray
 
 from .errors import FieldError
 from .evidence import Evidence
-from .moments import UNIFORM_VARIANCE, Moments
-from .patterns import ONE, PatternSet
+from .measure import uniform_moments
+from .moments import Moments
+from .patterns import ONE, UU, VV, PatternSet, U, V
 from .supports import BOX, LINEAR, NOTHING, PER_CHANNEL, SUPPORTS, WHOLE, Support
 
 SEARCH = "search"
 STAGE_AND_MATTE = "stage_and_matte"
 CHOICES = ("auto", *SUPPORTS, SEARCH, STAGE_AND_MATTE)
-# A mean this near to the patch's middle, its own uncertainty included, is the middle.
+# A mean this near to the uniform transport's, its own uncertainty included, is that one.
 CENTRED = 0.02
 # Half width, of the patch, from which on the linear projection beats the box.
 BROAD = 0.35
@@ -70,26 +72,33 @@ def _smallest(moments: Moments, hits: NDArray) -> NDArray[np.uint8]:
     Moments without spreads (NaN) leave the box out.
     """
     n = np.maximum(hits, 1e-9)
-    offs = [mean - 0.5 for mean in moments.mean]
-    uncertain = np.sqrt(2 * UNIFORM_VARIANCE / n)
+    # what the patch's uniform transport has: its mean is not the middle, seen from the scene
+    uniform = uniform_moments(moments.extent)
+    middle = uniform[[U, V]]
+    spread = uniform[[UU, VV]] - middle**2
+    offs = [mean - m for mean, m in zip(moments.mean, middle, strict=True)]
+    uncertain = np.sqrt(spread.sum() / n)
     centred = np.sqrt(offs[0] * offs[0] + offs[1] * offs[1]) + uncertain < CENTRED
     codes = np.where(centred, WHOLE.code, LINEAR.code).astype(np.uint8)
     if np.isfinite(moments.variance).any():
-        codes[_shown_box(moments, offs, n)] = BOX.code
+        codes[_shown_box(moments, offs, spread, n)] = BOX.code
     return codes
 
 
-def _shown_box(moments: Moments, offs: list[NDArray], n: NDArray) -> NDArray[np.bool_]:
+def _shown_box(
+    moments: Moments, offs: list[NDArray], uniform: NDArray, n: NDArray
+) -> NDArray[np.bool_]:
     """Where a box is shown, and narrow enough to be the better filter -> (n,).
 
-    offs: the means' distances from the middle, along u and v; n: hits.
+    offs: the means' distances from the uniform transport's, along u and v; uniform: (2,) its
+    variances; n: hits.
     """
     spread_gain = np.zeros(len(n))
     narrow = np.ones(len(n), bool)
-    for off, variance in zip(offs, moments.variance, strict=True):
+    for off, variance, whole in zip(offs, moments.variance, uniform, strict=True):
         # twice the gain in log likelihood, a sample, of a spread of its own over that of a linear
-        # density, 1/12 - off^2
-        expected = np.maximum(UNIFORM_VARIANCE - off * off, UNIFORM_VARIANCE / 4)
+        # density, which is the uniform one's less off^2
+        expected = np.maximum(whole - off * off, whole / 4)
         ratio = np.maximum(variance / expected, 1e-9)
         spread_gain += ratio - 1 - np.log(ratio)
         narrow &= 3 * variance < BROAD**2
@@ -118,11 +127,11 @@ def choose(
     if choice == "auto":
         # most entries are too dark to keep: what they see of their patch is not asked for
         lit = known.kept(coefficient)
-        moments = Moments.from_basis(basis[:, lit], patterns, separate)
+        moments = Moments.from_basis(basis[:, lit], patterns, separate, known.extent(k))
         codes[lit] = _smallest(moments, known.hits(k, coefficient)[lit])
     else:
         lit = np.flatnonzero((coefficient > 0).any(axis=-1))
-        moments = Moments.from_basis(basis[:, lit], patterns, separate)
+        moments = Moments.from_basis(basis[:, lit], patterns, separate, known.extent(k))
         codes[lit] = SUPPORTS[choice].code
     found: dict[int, NDArray] = {}
     chosen = codes[lit]

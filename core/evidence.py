@@ -28,7 +28,8 @@ class Evidence:
 
     least: (n,) coefficient, summed over channels, under which an entry is dropped; total: (n,) that
     of all patches; shape: (h, w) of the tile, n = h x w; samples: samples a pixel of the capture,
-    None without noise (photographs); grain: (K, h, w), see `capture_set.GRAIN`.
+    None without noise (photographs); grain: (K, h, w), see `capture_set.GRAIN`; extents: (K, 4),
+    `Hemicube.extents`, None where the patches are to be taken for uniform in area.
     """
 
     least: NDArray
@@ -36,6 +37,11 @@ class Evidence:
     shape: tuple[int, int]
     samples: float | None = None
     grain: NDArray | None = None
+    extents: NDArray | None = None
+
+    def extent(self, k: int) -> NDArray | None:
+        """Where patch k is on its face, None where that is not known."""
+        return None if self.extents is None else self.extents[k]
 
     def kept(self, coefficient: NDArray) -> NDArray[np.intp]:
         """The pixels in which a patch of these coefficients, (n, 3), is more than nothing."""
@@ -68,6 +74,7 @@ def evidence(
     shape: tuple[int, int],
     samples: float | None = None,
     grain: NDArray | None = None,
+    extents: NDArray | None = None,
 ) -> Evidence:
     """What is known of a tile: see `Evidence`. coefficients: (K, n, 3) of all patches."""
     pixels = coefficients.shape[1]
@@ -80,7 +87,7 @@ def evidence(
         kept = np.cumsum(size, axis=1) > DROPPED * total[block, None]
         # the smallest entry that must be kept
         least[block] = np.take_along_axis(size, kept.argmax(axis=1)[:, None], axis=1)[:, 0]
-    return Evidence(least, total, shape, samples, grain)
+    return Evidence(least, total, shape, samples, grain, extents)
 
 
 def _window_sum(image: NDArray) -> NDArray:

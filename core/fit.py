@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import choice as choices
 from .capture_set import CaptureSet, TileData
@@ -15,7 +16,7 @@ from .evidence import evidence
 from .field_writer import FieldWriter, TileWriter
 from .moments import Moments, channel_sum
 from .patterns import PatternSet
-from .search import search
+from .search import in_solid_angle, search
 from .supports import BOX, WHOLE
 
 
@@ -25,11 +26,12 @@ def fit_tile(
     choice: str,
     samples: float | None = None,
     separate: bool = False,
+    extents: NDArray | None = None,
 ) -> Iterator[float | TileWriter]:
     """Fit one tile: yields the share that is done, and last the tile, ready to be written.
 
     samples: samples a pixel of the capture, which tell how far its noise can be believed (None: no
-    noise); separate: a support for each channel.
+    noise); separate: a support for each channel; extents: (K, 4), `Hemicube.extents`.
     """
     layers = {"own": data.own, "alpha": data.alpha, **data.guides}
     writer = TileWriter(data.region, layers)
@@ -37,14 +39,14 @@ def fit_tile(
     images = data.basis.reshape(patches, len(patterns), -1, 3)
     coefficients = patterns.coefficient(np.moveaxis(images, 1, 0))
     shape = (data.region.height, data.region.width)
-    known = evidence(coefficients, shape, samples, data.grain)
+    known = evidence(coefficients, shape, samples, data.grain, extents)
     brightest = None
     if choice == choices.STAGE_AND_MATTE:
         brightest = channel_sum(coefficients).argmax(axis=0)
     for k in range(patches):
         if choice == choices.SEARCH:
             codes, _ = choices.choose("whole", images[k], coefficients[k], patterns, known, k)
-            boxes = search(images[k], patterns, data.region.height)
+            boxes = in_solid_angle(search(images[k], patterns, data.region.height), known.extent(k))
             parameters = {BOX.code: boxes[codes == WHOLE.code]}
             codes[codes == WHOLE.code] = BOX.code
         elif brightest is not None:
@@ -52,7 +54,11 @@ def fit_tile(
             codes, _ = choices.choose("whole", images[k], coefficients[k], patterns, known, k)
             codes[(brightest == k) & (codes == WHOLE.code)] = BOX.code
             parameters = {
-                s.code: s.fit(Moments.from_basis(images[k][:, codes == s.code], patterns))
+                s.code: s.fit(
+                    Moments.from_basis(
+                        images[k][:, codes == s.code], patterns, extent=known.extent(k)
+                    )
+                )
                 for s in (WHOLE, BOX)
             }
         else:
@@ -79,6 +85,7 @@ def fit(
     """
     choices.check(choice, captured.patterns, separate)
     samples = captured.head.get("samples")
+    patterns, extents = captured.patterns, captured.hemicube.extents
     begun = time.perf_counter()
     reading = 0.0
     keep = ("scene", "colour_space", "samples", "file", "frame", "view_layer", "far", "key")
@@ -94,7 +101,7 @@ def fit(
             start = time.perf_counter()
             data = captured.read(tile)
             reading += time.perf_counter() - start
-            for step in fit_tile(data, captured.patterns, choice, samples, separate):
+            for step in fit_tile(data, patterns, choice, samples, separate, extents):
                 if isinstance(step, TileWriter):
                     writer.add(step)
                 else:

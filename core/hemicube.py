@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import HemicubeError
+from .measure import uniform_moments
 
 # name -> (centre, direction of u, direction of v); seen from inside, v is up on the four sides.
 FACES: dict[str, tuple[tuple[int, int, int], ...]] = {
@@ -241,6 +242,10 @@ class Hemicube:
             return np.arctan2(x * y, np.sqrt(1 + x * x + y * y))
 
         return corner(x1, y1) - corner(x0, y1) - corner(x1, y0) + corner(x0, y0)
+
+    def uniform_moments(self, k: int) -> NDArray[np.float64]:
+        """(6,): the normalised moments of a transport uniform in solid angle over patch k."""
+        return uniform_moments(self.extents[k])
 
     @property
     def closed(self) -> bool:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from .patterns import ONE, UU, UV, VV, PatternSet, U, V
 
+# Of a transport uniform in area.
 UNIFORM_VARIANCE = 1 / 12
 
 
@@ -25,18 +26,26 @@ class Moments:
     coefficient: (n, 3) reflection coefficient R per channel. normalised: (6, n) moments shared by
     the channels, over the zeroth; NaN where the patterns cannot tell. A pixel without light from
     the patch has those of the whole patch. channels: the same for red, green and blue by
-    themselves, where they were asked for.
+    themselves, where they were asked for. extent: where the patch is on its face
+    (`Hemicube.extents`), None where its light is uniform in area (`measure`).
     """
 
     coefficient: NDArray
     normalised: NDArray
     channels: tuple[Moments, ...] = ()
+    extent: NDArray | None = None
 
     @staticmethod
-    def from_basis(basis: NDArray, patterns: PatternSet, per_channel: bool = False) -> Moments:
+    def from_basis(
+        basis: NDArray,
+        patterns: PatternSet,
+        per_channel: bool = False,
+        extent: NDArray | None = None,
+    ) -> Moments:
         """basis: (P, n, 3) -> the moments. The channels share a support, as in the paper (5).
 
-        per_channel: also the moments of each channel by itself, in `channels`.
+        per_channel: also the moments of each channel by itself, in `channels`; extent: of the
+        patch.
         """
         # float64: a narrow support is a small difference of large moments
         shared = patterns.moments(channel_sum(basis))
@@ -44,8 +53,8 @@ class Moments:
         channels: tuple[Moments, ...] = ()
         if per_channel:
             each = (patterns.moments(basis[..., c].astype(np.float64)) for c in range(3))
-            channels = tuple(Moments(coefficient, normalise(m)) for m in each)
-        return Moments(coefficient, normalise(shared), channels)
+            channels = tuple(Moments(coefficient, normalise(m), extent=extent) for m in each)
+        return Moments(coefficient, normalise(shared), channels, extent)
 
     def select(self, pixels: NDArray) -> Moments:
         """The moments of some of the pixels (a mask or indices)."""
@@ -53,6 +62,7 @@ class Moments:
             self.coefficient[pixels],
             self.normalised[:, pixels],
             tuple(c.select(pixels) for c in self.channels),
+            self.extent,
         )
 
     @cached_property

@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .measure import box_of
 from .patterns import PatternSet
 
 # The previous pixel's support is taken up where the coefficients differ by less than this share.
@@ -120,3 +121,12 @@ def search(
             start[near] = out[near, x - 1]
         out[:, x] = descend(start, patterns, targets[:, :, x], COARSEST, finest)
     return out.reshape(-1, 4)
+
+
+def in_solid_angle(boxes: NDArray, extent: NDArray | None) -> NDArray[np.float64]:
+    """Boxes (n, 4) found with the patterns averaged by area, as boxes of the same moments in the
+    measure that the light is averaged in. extent: of the patch, None: as they are."""
+    u0, u1, v0, v1 = boxes.T
+    mean = ((u0 + u1) / 2, (v0 + v1) / 2)
+    variance = ((u1 - u0) ** 2 / 12, (v1 - v0) ** 2 / 12)
+    return box_of(mean, variance, extent)

@@ -50,6 +50,21 @@ def _planted(patterns: PatternSet, boxes: NDArray, coefficient: NDArray) -> NDAr
     return (patterns.matrix @ moments)[..., None] * coefficient
 
 
+def _seen(patterns: PatternSet, boxes: NDArray, coefficient: NDArray, extent: NDArray) -> NDArray:
+    """`_planted` as a scene sees it: uniform in solid angle over boxes of a patch on a face."""
+    nodes, weights = np.polynomial.legendre.leggauss(16)
+    t = (nodes + 1) / 2
+    u0, u1, v0, v1 = boxes.T
+    u = (u0[:, None] + (u1 - u0)[:, None] * t)[:, :, None]
+    v = (v0[:, None] + (v1 - v0)[:, None] * t)[:, None, :]
+    x = extent[0] + (extent[1] - extent[0]) * u
+    y = extent[2] + (extent[3] - extent[2]) * v
+    weight = (1 + x * x + y * y) ** -1.5 * np.outer(weights, weights)
+    images = patterns.radiance(*np.broadcast_arrays(u, v))
+    found = (images * weight).sum(axis=(2, 3)) / weight.sum(axis=(1, 2))
+    return found[..., None] * coefficient
+
+
 def _hits(patterns: PatternSet, u: NDArray, v: NDArray, weights: NDArray) -> NDArray:
     """Basis images (P, n, 3) of transports that are points: u, v (m, n), weights (m, n, 3)."""
     return np.einsum("pmn,mnc->pnc", patterns.radiance(u, v), weights)
@@ -119,8 +134,13 @@ def _scene(
     coefficient = 10 ** rng.uniform(-2, 0, (k, *shape, 3))
     coefficient[rng.random((k, *shape)) < unlit] = 0
     chosen = pattern_set(patterns)
-    basis = _planted(chosen, boxes.reshape(-1, 4), coefficient.reshape(-1, 3))
-    basis = np.moveaxis(basis.reshape(len(chosen), k, *shape, 3), 0, 1).astype(np.float32)
+    basis = np.stack(
+        [
+            _seen(chosen, b.reshape(-1, 4), r.reshape(-1, 3), extent)
+            for b, r, extent in zip(boxes, coefficient, hemicube.extents, strict=True)
+        ]
+    )
+    basis = basis.reshape(k, len(chosen), *shape, 3).astype(np.float32)
     own = rng.uniform(0, 2, (*shape, 3)).astype(np.float32)
     alpha = rng.uniform(0, 1, shape).astype(np.float32)
     return Scene(hemicube, chosen, boxes, coefficient, basis, own, alpha)

@@ -84,8 +84,9 @@ def test_linear_and_whole_are_what_they_say(fields, made, noisy) -> None:
     plane = light.polynomial((ONE, U, V))
     linear, whole = (made.own.astype(np.float64) for _ in range(2))
     for k in range(len(CUBE)):
-        b, r = made.boxes[k], made.coefficient[k]
-        mu, mv = (b[..., :1] + b[..., 1:2]) / 2, (b[..., 2:3] + b[..., 3:]) / 2
+        r = made.coefficient[k]
+        white = np.maximum(made.basis[k, 0, ..., :1], 1e-30)
+        mu, mv = (made.basis[k, p, ..., :1] / white for p in (1, 3))
         linear = linear + r * (plane[k, 0] + mu * plane[k, 1] + mv * plane[k, 2])
         whole = whole + r * light.whole[k]
     np.testing.assert_allclose(relight(fields["linear"], light)[..., :3], linear, rtol=2 * HALF)
@@ -96,12 +97,16 @@ def test_auto_is_the_box_where_it_is_narrow_both_ways_and_the_plane_elsewhere(
     fields, made, noisy
 ) -> None:
     light = PatchLight(noisy(2), CUBE)
-    size = made.boxes[..., 1::2] - made.boxes[..., ::2]
-    broad = (size > 2 * BROAD).any(axis=-1)
-    codes = fields["auto"].tiles[0].codes.reshape(broad.shape)
+    codes = fields["auto"].tiles[0].codes.reshape(made.boxes.shape[:-1])
     lit = codes != NOTHING
-    # a broad light whose mean is the middle is the whole patch
-    off = np.hypot(made.boxes[..., :2].mean(axis=-1) - 0.5, made.boxes[..., 2:].mean(axis=-1) - 0.5)
+    # a broad light whose mean is the uniform transport's is the whole patch
+    white = np.where(lit, made.basis[:, 0, ..., 0], 1)
+    mean = [made.basis[:, p, ..., 0] / white for p in (1, 3)]
+    square = [made.basis[:, p, ..., 0] / white for p in (2, 4)]
+    spreads = np.stack([s - m * m for s, m in zip(square, mean, strict=True)])
+    broad = (np.sqrt(3 * spreads) > BROAD).any(axis=0)
+    uniform = np.array([CUBE.uniform_moments(k) for k in range(len(CUBE))])
+    off = np.hypot(*(m - uniform[:, n, None, None] for m, n in zip(mean, (U, V), strict=True)))
     flat = np.where(off < CENTRED, WHOLE.code, LINEAR.code)
     np.testing.assert_array_equal(codes[lit], np.where(broad, flat, BOX.code)[lit])
     assert (lit & broad).sum() > 20 and (lit & ~broad).sum() > 20
@@ -110,7 +115,7 @@ def test_auto_is_the_box_where_it_is_narrow_both_ways_and_the_plane_elsewhere(
     for k in range(len(CUBE)):
         b = made.boxes[k]
         box = light.box(k, *b.reshape(-1, 4).T).reshape(6, 8, 3)
-        mu, mv = (b[..., :1] + b[..., 1:2]) / 2, (b[..., 2:3] + b[..., 3:]) / 2
+        mu, mv = (m[k][..., None] for m in mean)
         flat = plane[k, 0] + mu * plane[k, 1] + mv * plane[k, 2]
         flat = np.where((off[k] < CENTRED)[..., None], light.whole[k], flat)
         r = made.coefficient[k] * lit[k][..., None]
