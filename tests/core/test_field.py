@@ -416,7 +416,7 @@ def rest_field(folder: Path, coefficients: np.ndarray) -> Field:
 
 
 def test_what_is_dropped_is_kept_as_a_rest(tmp_path: Path) -> None:
-    """Under uniform light nothing is lost; under a sun in a dropped patch, nothing of the tile's."""
+    """Under uniform light nothing is lost; under a sun in a dropped patch nothing of the tile."""
     from arto.core.environment import Environment
     from arto.core.light import PatchLight
 
