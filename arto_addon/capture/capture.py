@@ -70,7 +70,7 @@ def capture(scene: bpy.types.Scene, view_layer: str) -> Steps:
     SceneError, CaptureSetError, BusyError (another process captures this shot), ExrError,
     CancelledError; the scene stays as it is, but for the ID that its shots are found by.
     """
-    check_scene(scene)
+    check_scene(scene, view_layer)
     # whatever a script has moved is where it should be
     scene.view_layers[view_layer].update()
     claimed = paths.claim(scene, view_layer)

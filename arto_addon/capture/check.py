@@ -6,13 +6,13 @@ import bpy
 
 from ...core.errors import SceneError
 from ..stage.stage import picture_size
-from ..world.check import check_no_volume
+from ..world.check import check_no_volume, world_of
 
 # Blender itself renders none smaller, denoising and the world behind included.
 LEAST_PIXELS = 4
 
 
-def check_scene(scene: bpy.types.Scene) -> None:
+def check_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> None:
     """Raise SceneError for a scene that cannot be captured."""
     if scene.render.engine != "CYCLES":
         raise SceneError(
@@ -21,8 +21,8 @@ def check_scene(scene: bpy.types.Scene) -> None:
         )
     if scene.camera is None:
         raise SceneError("the scene has no camera: add one, or make one the scene's camera")
-    if scene.world:
-        check_no_volume(scene.world)
+    if world := world_of(scene, view_layer):
+        check_no_volume(world)
     width, height = picture_size(scene)
     if min(width, height) < LEAST_PIXELS:
         raise SceneError(

@@ -56,8 +56,8 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     Raises SceneError, CaptureSetError (of another shot), ShotError (another's), FieldError,
     EnvironmentMapError, ExrError, CancelledError; nothing of the scene changes.
     """
-    check_world(scene)
     layer = view_layer or layer_of(scene)
+    world = check_world(scene, layer)
     scene.view_layers[layer].update()
     settings = scene.arto
     path = paths.relit_file(scene)
@@ -80,7 +80,7 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
         last = now
 
     yield Progress(0.0, "bringing the world to an environment map")
-    environment = bake(scene, settings.environment_width)
+    environment = bake(scene, settings.environment_width, layer)
     lap("world")
     parts: list[NDArray[np.float32]] = []
     lamps, together = "no", False
@@ -127,11 +127,10 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
         yield Progress(0.8, "adding the world behind")
         behind = np.nonzero(picture[..., 3] < OPAQUE)
         if len(behind[0]):
-            picture = over(picture, background(scene, Region.around(*behind)))
+            picture = over(picture, background(scene, Region.around(*behind), layer))
         lap("background")
     yield Progress(0.9, f"writing {path}")
-    world = scene.world.name if scene.world else ""
-    about = {"scene": scene.name, "world": world, "denoised": denoised, "lamps": lamps}
+    about = {"scene": scene.name, "world": world.name, "denoised": denoised, "lamps": lamps}
     about |= {"look": settings.look, "changed since capture": "; ".join(changed)}
     plate.write(path, picture, {name: text for name, text in about.items() if text})
     lap("write")

@@ -17,14 +17,16 @@ BACKGROUND_SAMPLES = 64
 BACKGROUND_NOISE = 0.002
 
 
-def background(scene: bpy.types.Scene, region: Region | None = None) -> NDArray[np.float32]:
+def background(
+    scene: bpy.types.Scene, region: Region | None = None, view_layer: str | None = None
+) -> NDArray[np.float32]:
     """The world as the artist's camera sees it behind everything -> (H, W, 3).
 
     region: all that is looked at, 0 outside (default: everything). Pixels get as many samples as
     they need, up to `BACKGROUND_SAMPLES`: next to none in an even sky, all on the rim of a sun.
     """
-    check_world(scene)
-    with studio_scene(scene, "ARTO Background") as (studio, _):
+    world = check_world(scene, view_layer)
+    with studio_scene(scene, world, "ARTO Background") as (studio, _):
         studio.camera = scene.camera
         width, height = picture_size(scene)
         render = studio.render

@@ -136,15 +136,16 @@ def _coarser(environment: Environment, scale: int) -> Environment:
     return Environment((rows / scale).astype(np.float32))
 
 
-def bake(scene: bpy.types.Scene, width: int) -> Environment:
-    """The world's light as an equirectangular map, width x width/2, in the working space.
+def bake(scene: bpy.types.Scene, width: int, view_layer: str | None = None) -> Environment:
+    """The light of a view layer's world as an equirectangular map, width x width/2, in the working
+    space.
 
     Every texel is the mean over itself, of as many samples as the world's own detail asks for: a
-    disc of a tenth of a degree keeps its light to 1%. Raises SceneError for a world that is not there or lacks
-    an image.
+    disc of a tenth of a degree keeps its light to 1%. Raises SceneError for a world that is not
+    there or lacks an image.
     """
-    check_world(scene)
-    with studio_scene(scene, "ARTO World") as (studio, made):
+    world = check_world(scene, view_layer)
+    with studio_scene(scene, world, "ARTO World") as (studio, made):
         lens = bpy.data.cameras.new("ARTO Panorama")
         camera = bpy.data.objects.new("ARTO Panorama", lens)
         made += [camera, lens]
@@ -155,9 +156,9 @@ def bake(scene: bpy.types.Scene, width: int) -> Environment:
         # the middle of the picture looks along +X, as the middle of a world texture does
         camera.rotation_euler = (math.pi / 2, 0, -math.pi / 2)
         lens.clip_start = 1e-3
-        if sees_the_camera(scene.world):
+        if sees_the_camera(world):
             _pass_through(made, studio)
-        finest = detail(scene.world)
+        finest = detail(world)
         # a lamp is looked for in small texels, and a coarse map gets their means
         scale = math.ceil(min(finest, LEAST_WIDTH) / width)
         width, height = scale * width, scale * (width // 2)

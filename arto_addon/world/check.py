@@ -8,11 +8,20 @@ import bpy
 
 from ...core.errors import SceneError
 from ..blender.nodes import trees
+from ..shot.shot import layer_of
 
 
-def check_world(scene: bpy.types.Scene) -> None:
-    """Raise SceneError for a scene without a world, or one whose images are missing."""
-    world = scene.world
+def world_of(scene: bpy.types.Scene, view_layer: str | None = None) -> bpy.types.World | None:
+    """The world that a view layer is rendered with (default: the one that is captured): its
+    override, or the scene's."""
+    layer = scene.view_layers.get(view_layer or layer_of(scene))
+    return (layer.world_override if layer else None) or scene.world
+
+
+def check_world(scene: bpy.types.Scene, view_layer: str | None = None) -> bpy.types.World:
+    """The world of a view layer. Raises SceneError where there is none, it has a volume, or an
+    image of it is missing."""
+    world = world_of(scene, view_layer)
     if world is None:
         raise SceneError(
             "the scene has no world to relight with: add one with an HDRI (World properties)"
@@ -33,6 +42,7 @@ def check_world(scene: bpy.types.Scene) -> None:
                         f"the world's image '{image.name}' is missing on disk ({path}): find it "
                         "again (File, External Data, Find Missing Files), or choose another"
                     )
+    return world
 
 
 def check_no_volume(world: bpy.types.World) -> None:
