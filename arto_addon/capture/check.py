@@ -13,7 +13,8 @@ LEAST_PIXELS = 4
 
 
 def check_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> None:
-    """Raise SceneError for a scene that cannot be captured."""
+    """Raise SceneError for settings that cannot be captured; what is rendered is asked on the stage
+    (`stage.bounds.Rendered.check`)."""
     if scene.render.engine != "CYCLES":
         raise SceneError(
             f"the render engine is {scene.render.engine}: ARTO captures with Cycles; choose it in "
@@ -27,19 +28,6 @@ def check_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> None:
     if min(width, height) < LEAST_PIXELS:
         raise SceneError(
             f"the picture has only {width}x{height} pixels: raise the resolution or its percentage"
-        )
-    things = list(scene.objects)
-    things += [
-        o for e in things if e.instance_collection for o in e.instance_collection.all_objects
-    ]
-    # a lamp's own flag means nothing
-    catchers = [
-        o.name for o in things if o.type != "LIGHT" and o.is_shadow_catcher and not o.hide_render
-    ]
-    if catchers:
-        raise SceneError(
-            f"'{catchers[0]}' is a shadow catcher, which writes no light groups: turn Shadow "
-            "Catcher off (Object properties, Visibility) and capture it as an object"
         )
     if not scene.arto.faces:
         raise SceneError("the hemicube has no faces: choose at least one")

@@ -45,10 +45,26 @@ def check_world(scene: bpy.types.Scene, view_layer: str | None = None) -> bpy.ty
     return world
 
 
+def _fills(socket: bpy.types.NodeSocket) -> bool:
+    """Whether what is linked to a volume socket is anything: not muted, not of density 0."""
+    link = next((i for i in socket.links if not i.is_muted), None)
+    if link is None:
+        return False
+    node = link.from_node
+    handed_on = [s for s in node.inputs if s.type == "SHADER"]
+    if node.bl_idname == "NodeReroute" or handed_on:
+        return any(_fills(s) for s in handed_on or node.inputs)
+    if node.mute:
+        return False
+    amounts = ("Density", "Emission Strength", "Blackbody Intensity")
+    found = [s for s in node.inputs if s.name in amounts and s.enabled]
+    return not found or any(s.is_linked or s.default_value for s in found)
+
+
 def check_no_volume(world: bpy.types.World) -> None:
     """Raise SceneError for a world filled with fog: it swallows light from afar, an HDRI's too."""
     out = world.node_tree.get_output_node("CYCLES") if world.node_tree else None
-    if out and out.inputs["Volume"].is_linked:
+    if out and _fills(out.inputs["Volume"]):
         raise SceneError(
             "the world has a volume, which swallows all light from afar: put the fog into an "
             "object around the scene instead"
