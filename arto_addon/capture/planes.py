@@ -15,7 +15,7 @@ from ...core.capture_set import GRAIN, group_name
 from ...core.hemicube import FACE_NAMES, Hemicube
 from ...core.patterns import PatternSet, pattern_set
 from ..blender.nodes import Nodes
-from ..stage.stage import Stage
+from ..stage.stage import Stage, free_mark
 
 COLLECTION = "ARTO Hemicube"
 PATTERN = "arto_pattern"
@@ -172,11 +172,12 @@ def build(
     patterns: PatternSet,
     images: Iterable[tuple[int, str]],
     made: Callable[[Any], Any],
+    mark: str = "",
 ) -> None:
     """Fill `collection` with a plane for each (patch, pattern name) of `images`.
 
-    Each plane carries the light group `capture_set.group_name`. `made` is told of every new
-    data-block.
+    Each plane carries the light group of its image, by a name with that mark (see
+    `stage.free_mark`), or none without. `made` is told of every new data-block.
     """
     images = list(images)
     used = list(dict.fromkeys(name for _, name in images))
@@ -184,9 +185,10 @@ def build(
     centre = np.array(hemicube.centre)
     for k, pattern in images:
         name = group_name(k, pattern)
+        group = name.replace("ARTO_", mark, 1) if mark else ""
         distance = hemicube.size * (1 + GAP * used.index(pattern))
         plane = _plane(name, centre + distance * hemicube.corners(k), materials[pattern], made)
-        plane.lightgroup = name
+        plane.lightgroup = group
         plane[PATTERN] = float(used.index(pattern) + 1)
         collection.objects.link(plane)
 
@@ -211,9 +213,9 @@ def lit(
             layer.material_override = note(overriding_material(override, names, patterns))
         collection = note(bpy.data.collections.new("ARTO Capture"))
         on.scene.collection.children.link(collection)
-        build(collection, hemicube, patterns, images, note)
-        for k, name in images:
-            layer.lightgroups.add(name=group_name(k, name))
+        build(collection, hemicube, patterns, images, note, free_mark())
+        for plane in collection.objects:
+            layer.lightgroups.add(name=plane.lightgroup)
         yield
     finally:
         layer.material_override = override

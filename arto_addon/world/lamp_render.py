@@ -21,13 +21,11 @@ from ...core.field import Field
 from ...core.region import Region
 from ..blender.output import write_to
 from ..stage.settings import prepare
-from ..stage.stage import Stage, set_region, stage
+from ..stage.stage import Stage, free_mark, set_region, stage
 from ..work import Render, Steps
 
-GROUP = "ARTO_lamps"
 
-
-def _world(on: Stage, lamps: Environment) -> Any:
+def _world(on: Stage, lamps: Environment, group: str) -> Any:
     """A world that shows the map of the lamps, in a light group of its own."""
     height, width = lamps.image.shape[:2]
     image = on.made(
@@ -43,7 +41,7 @@ def _world(on: Stage, lamps: Environment) -> Any:
     texture = nodes.new("ShaderNodeTexEnvironment")
     texture.image = image
     world.node_tree.links.new(texture.outputs["Color"], nodes["Background"].inputs["Color"])
-    world.lightgroup = GROUP
+    world.lightgroup = group
     # left to itself, Cycles takes a second for a map of 4096; twice as fine as the light finds the
     # rims of its texels, which are blended
     world.cycles.sampling_method = "MANUAL"
@@ -77,8 +75,12 @@ def lamp_light(
         on.change("render.engine", "CYCLES")
         prepare(on, layers=0)
         on.change("cycles.samples", samples)
-        on.scene.world = _world(on, lamps)
-        on.scene.view_layers[0].lightgroups.add(name=GROUP)
+        # a render like any of the artist's: what tames its fireflies does no harm to a field
+        for name in ("sample_clamp_direct", "sample_clamp_indirect"):
+            on.change(f"cycles.{name}", getattr(scene.cycles, name))
+        group = free_mark() + "lamps"
+        on.scene.world = _world(on, lamps, group)
+        on.scene.view_layers[0].lightgroups.add(name=group)
         set_region(on.scene, region)
         path = Path(folder) / "lamps.exr"
         write_to(on.scene.render, path)
@@ -86,7 +88,7 @@ def lamp_light(
         yield request
         request.check()
         parts = exr.read(path)
-        light = next((p for name, p in parts.items() if name.endswith(GROUP)), None)
+        light = next((p for name, p in parts.items() if name.endswith(group)), None)
         if light is None:
             raise SceneError(
                 "Blender wrote no light of the world's lamps: turn Render Lamps off to relight "
