@@ -173,8 +173,8 @@ def test_pixels_that_are_no_number_are_said(shot, monkeypatch):
 
 
 def test_the_lamps_are_clamped_as_the_artist_clamps(shot):
-    """Their render is an ordinary one: with its light clamped to a tenth no path brings more (of its
-    channels together, three times that), and the scene's own lamp, in a group named as ours is,
+    """Their render is an ordinary one: with its light clamped to a tenth no path brings more (its
+    channels together three times that), and the scene's own lamp, in a group named as ours is,
     stays out of it."""
     field = Field(paths.field_folder(shot))
     found = split(bake(shot, 256)).lamps
