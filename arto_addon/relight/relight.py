@@ -21,7 +21,7 @@ from ..shot.status import changed_since
 from ..work import Progress, Steps
 from ..world.background import background, background_with_holes, holds_out
 from ..world.bake import bake
-from ..world.check import check_world
+from ..world.check import check_world, differs_by_rays
 from ..world.lamp_render import lamp_light, region_of
 from . import denoise, plate
 
@@ -80,6 +80,8 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
         last = now
 
     yield Progress(0.0, "bringing the world to an environment map")
+    if by_rays := differs_by_rays(world):
+        yield Progress(0.0, f"the world is {by_rays}")
     environment = bake(scene, settings.environment_width, layer)
     lap("world")
     parts: list[NDArray[np.float32]] = []
@@ -145,7 +147,11 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
         glass = "opaque: what is seen through it is in it, whatever Transparent Glass says"
         about["glass"] = glass
         yield Progress(0.9, f"glass: {glass}")
-    about |= {"look": settings.look, "changed since capture": "; ".join(changed)}
+    about |= {
+        "look": settings.look,
+        "world by rays": by_rays,
+        "changed since capture": "; ".join(changed),
+    }
     plate.write(path, picture, {name: text for name, text in about.items() if text})
     lap("write")
     say = f" (denoised: {denoised})" if settings.denoise else ""

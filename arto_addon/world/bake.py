@@ -158,6 +158,9 @@ def bake(scene: bpy.types.Scene, width: int, view_layer: str | None = None) -> E
         lens.clip_start = 1e-3
         if sees_the_camera(world):
             _pass_through(made, studio)
+            rays = studio.world.cycles_visibility
+            # what is hidden from some rays lights by others; these are those of the box
+            rays.transmission = rays.diffuse or rays.glossy or rays.transmission or rays.scatter
         finest = detail(world)
         # a lamp is looked for in small texels, and a coarse map gets their means
         scale = math.ceil(min(finest, LEAST_WIDTH) / width)

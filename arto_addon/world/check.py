@@ -69,3 +69,31 @@ def check_no_volume(world: bpy.types.World) -> None:
             "the world has a volume, which swallows all light from afar: put the fog into an "
             "object around the scene instead"
         )
+
+
+# Kinds of rays that a world may shine differently for, and none of which a map can tell apart.
+_KINDS = ("diffuse", "glossy", "transmission", "scatter")
+_OF_CAMERA = {"Is Camera Ray", "Is Shadow Ray"}
+
+
+def differs_by_rays(world: bpy.types.World) -> str:
+    """What a world does that one map of its light cannot, and what is used instead; "" if nothing.
+
+    A world that shows the camera alone something else is no such world.
+    """
+    rays = world.cycles_visibility
+    seen = [kind for kind in _KINDS if getattr(rays, kind)]
+    if 0 < len(seen) < len(_KINDS):
+        hidden = " and ".join(k for k in _KINDS if k not in seen)
+        return f"hidden from {hidden} rays: all rays see it alike here"
+    for tree in trees(world.node_tree, set()):
+        for node in tree.nodes:
+            if node.bl_idname != "ShaderNodeLightPath":
+                continue
+            for socket in node.outputs:
+                if socket.is_linked and socket.name not in _OF_CAMERA:
+                    return (
+                        f"mixed by '{socket.name}': all rays see what a ray through clear glass "
+                        "sees here"
+                    )
+    return ""

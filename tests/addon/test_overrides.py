@@ -58,6 +58,10 @@ def test_all_of_relighting_reads_the_layers_world(tmp_path):
     run_all(scene)
     path, _ = work.run(relight.relight(scene))
     assert exr.header(path)["arto.world"] == "World"
+    assert "arto.world by rays" not in exr.header(path)
+    scene.world.cycles_visibility.glossy = False
+    path, _ = work.run(relight.relight(scene))
+    assert "glossy" in exr.header(path)["arto.world by rays"]
     scene.view_layers[0].world_override = world_of_colour((1, 0, 0))
     path, _ = work.run(relight.relight(scene))
     assert exr.header(path)["arto.world"] == "Other.001"
