@@ -39,3 +39,4 @@ def prepare(on: Stage, layers: int) -> None:
     world.node_tree.nodes.clear()
     on.changed["world"] = [on.scene.world.name if on.scene.world else None, None]
     on.scene.world = world
+    layer.world_override = None
