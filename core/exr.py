@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import mmap
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,8 @@ from .files import whole
 # No name in a header is longer.
 _LONGEST_TEXT = 256
 _ORDER = "RGBAXYZ"  # of channels in an array; others follow
+# How many channels a message names.
+_TOLD = 6
 # What a colour space is called in an EXR header (colorInteropID), by Blender's name for it.
 COLOUR_SPACES = {
     "Linear Rec.709": "lin_rec709_scene",
@@ -37,7 +39,8 @@ def _openexr() -> Any:
     return OpenEXR
 
 
-def _open(path: Path, header_only: bool) -> Any:
+def _parts(path: Path, header_only: bool) -> list[Any]:
+    """The parts of a file as the library has them. Raises ExrError."""
     parts = _check_complete(path)
     try:
         file = _openexr().File(str(path), separate_channels=True, header_only=header_only)
@@ -46,7 +49,7 @@ def _open(path: Path, header_only: bool) -> Any:
     # the library leaves out a part that it cannot decode, with a warning
     if len(file.parts) != parts:
         raise ExrError(f"{path} has a damaged part: make it again")
-    return file
+    return list(file.parts)
 
 
 def _check_complete(path: Path) -> int:
@@ -111,41 +114,80 @@ def _complete_parts(data: mmap.mmap) -> int:
 
 
 def part_names(path: Path) -> list[str]:
-    """The names of the parts of a file, without reading pixels (an unnamed part is '')."""
-    return [str(p.header.get("name", "")) for p in _open(path, header_only=True).parts]
+    """The names of the layers of a file as `parts` has them, without reading pixels."""
+    found = [p.header for p in _parts(path, header_only=True)]
+    return list(_layers(path, [(h, [c.name for c in h["channels"]]) for h in found]))
 
 
 def header(path: Path) -> dict[str, Any]:
     """The header of the first part."""
-    return dict(_open(path, header_only=True).parts[0].header)
+    return dict(_parts(path, header_only=True)[0].header)
 
 
 def read(path: Path) -> dict[str, NDArray]:
-    """All parts of a file by name; see `parts`."""
+    """All layers of a file by name; see `parts`."""
     return dict(parts(path))
 
 
 def parts(path: Path) -> Iterator[tuple[str, NDArray]]:
-    """The parts of a file, one by one: name, and (H, W, C), C as R, G, B(, A), or one channel.
+    """The layers of a file, one by one: name, and (H, W, C), C as R, G, B(, A), or one channel.
 
-    A part's name loses nothing; channel names lose their prefix. Raises ExrError for a file that
-    is missing, truncated, or has parts of odd channels.
+    Each may be a part of its own, or many share a part (as Blender interleaves them): then a
+    layer's name is that of its channels before the last dot. Raises ExrError for a file that is
+    missing, truncated, or has layers of odd channels.
     """
-    for part in _open(path, header_only=False).parts:
-        channels = {str(name).rsplit(".", 1)[-1]: ch.pixels for name, ch in part.channels.items()}
-        order = sorted(channels, key=lambda c: (_ORDER.find(c) if c in _ORDER else len(_ORDER), c))
-        if any(pixels is None for pixels in channels.values()):
-            raise ExrError(f"{path} has no pixels in part '{part.header.get('name')}'")
-        if len(part.channels) == 1:
-            pixels = next(iter(channels.values()))[..., None]
-        elif len(channels) == len(part.channels) and all(len(c) == 1 for c in channels):
-            pixels = np.stack([channels[c] for c in order], axis=-1)
-        else:
+    found = _parts(path, header_only=False)
+    for name, (part, channels) in _layers(path, [(p.header, p.channels) for p in found]).items():
+        # one layer at a time goes from the library's arrays into ours: nothing is there twice
+        planes = [found[part].channels.pop(channel).pixels for channel in channels]
+        if any(pixels is None for pixels in planes):
+            raise ExrError(f"{path} has no pixels in '{name}': make it again")
+        if len({pixels.shape for pixels in planes}) > 1:
             raise ExrError(
-                f"{path} has channels {sorted(map(str, part.channels))}: expected R, G, B "
-                "or one a part; save its layers as parts, or as files of their own"
+                f"{path} has channels of different sizes in '{name}': save it without subsampling"
             )
-        yield str(part.header.get("name", "")), pixels
+        half = all(pixels.dtype == np.float16 for pixels in planes)
+        out = np.empty((*planes[0].shape, len(planes)), np.float16 if half else np.float32)
+        for n in range(len(planes)):
+            out[..., n], planes[n] = planes[n], None
+        yield name, out
+
+
+def _layers(
+    path: Path, parts: list[tuple[dict[str, Any], Iterable[str]]]
+) -> dict[str, tuple[int, list[str]]]:
+    """The layers of a file: of each name the part, and the channels in the order of an array's.
+
+    parts: the header of each and the names of its channels.
+    """
+    out: dict[str, tuple[int, list[str]]] = {}
+    for part, (head, channels) in enumerate(parts):
+        by_prefix: dict[str, list[str]] = {}
+        for channel in channels:
+            by_prefix.setdefault(channel.rpartition(".")[0], []).append(channel)
+        own = str(head.get("name", ""))
+        for prefix, names in by_prefix.items():
+            # a part's own name loses nothing where the part is one layer
+            name = own if own and len(by_prefix) == 1 else prefix or own
+            if own and not name.startswith(own):
+                name = f"{own}.{name}"
+            if name in out:
+                raise ExrError(f"{path} has two layers '{name}': give each a name of its own")
+            last = {channel: channel.rpartition(".")[2] for channel in names}
+            if len(names) > 1 and not all(len(c) == 1 for c in last.values()):
+                more = f" and {len(names) - _TOLD} more" if len(names) > _TOLD else ""
+                raise ExrError(
+                    f"{path} has channels {sorted(names)[:_TOLD]}{more}: expected R, G, B or one "
+                    "a layer; save its layers as parts, or as files of their own"
+                )
+            out[name] = part, sorted(names, key=lambda c: (_place(last[c]), last[c]))
+    return out
+
+
+def _place(channel: str) -> int:
+    """Where a channel stands in an array; small letters are the same colours."""
+    found = _ORDER.find(channel.upper())
+    return found if found >= 0 else len(_ORDER)
 
 
 def write(
