@@ -9,7 +9,6 @@ allocator that Blender puts in malloc's place, and Blender aborts.
 from __future__ import annotations
 
 import mmap
-import struct
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -18,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import ExrError
+from .exr_layout import LayoutError
+from .exr_layout import check as check_layout
 from .files import whole
 
-# No name in a header is longer.
-_LONGEST_TEXT = 256
 _ORDER = "RGBAXYZ"  # of channels in an array; others follow
 # How many channels a message names.
 _TOLD = 6
@@ -53,64 +52,18 @@ def _parts(path: Path, header_only: bool) -> list[Any]:
 
 
 def _check_complete(path: Path) -> int:
-    """How many parts the file has; ExrError unless every chunk that its own table names is there.
-
-    The library reads what is left of a truncated file and fills the rest; here the light would
-    be wrong without a word. Layout: magic, version, headers, table of chunk offsets, chunks.
-    """
+    """How many parts the file has; ExrError unless all of it is there (`exr_layout`)."""
     if not path.is_file():
         raise ExrError(f"there is no file {path}: it was moved or deleted; make it again")
     try:
         if path.stat().st_size < 8:
             raise ExrError(f"{path} is no EXR file (or an empty one): make it again")
         with path.open("rb") as f, mmap.mmap(f.fileno(), 0, access=mmap.ACCESS_READ) as data:
-            if data[:4] != b"\x76\x2f\x31\x01":
-                raise ExrError(f"{path} is no EXR file (or an empty one): make it again")
-            parts = _complete_parts(data)
+            return check_layout(data)
+    except LayoutError as e:
+        raise ExrError(f"{path} is truncated or damaged, {e}: make it again") from None
     except OSError as e:
         raise ExrError(f"{path} cannot be read ({e}): look at its permissions and disk") from e
-    if not parts:
-        raise ExrError(f"{path} is truncated or damaged: make it again")
-    return parts
-
-
-def _complete_parts(data: mmap.mmap) -> int:
-    """The number of parts of an EXR file's bytes, 0 where some are missing."""
-    multipart = bool(data[5] & 0x10)
-    size, at, parts = len(data), 8, 0
-
-    def past_text(at: int) -> int:
-        """Where a text that begins at `at` is over; past the file's end where it is not."""
-        end = data.find(b"\0", at, at + _LONGEST_TEXT)
-        return end + 1 if end >= 0 else size + 1
-
-    while True:  # headers
-        empty = True
-        while (past := past_text(at)) > at + 1:  # an empty name ends a header
-            empty = False
-            past = past_text(past) + 4  # the attribute's type, and how long it is
-            if past > size:
-                return 0
-            at = past + struct.unpack_from("<I", data, past - 4)[0]
-        at = past
-        parts += not empty
-        if empty or not multipart:
-            break
-    if at + 8 > size:
-        return 0
-    # the table ends where the first chunk begins, which may be named last
-    end = struct.unpack_from("<Q", data, at)[0]
-    while True:
-        if end > size or end < at + 8 or (end - at) % 8:
-            return 0
-        table = np.frombuffer(data[at:end], "<u8")
-        if int(table.min()) == end:
-            break
-        end = int(table.min())
-    leader = 12 if multipart else 8
-    last = int(table.max()) + leader
-    whole = last <= size and last + struct.unpack_from("<I", data, last - 4)[0] <= size
-    return parts if whole else 0
 
 
 def part_names(path: Path) -> list[str]:

@@ -95,8 +95,8 @@ def page() -> str:
         [
             "# What a capture changes, and why",
             "",
-            "A capture happens on a copy of the scene, which is thrown away: yours stays as it is.",
-            "On the copy these are set; `capture.json` says what they were. Output settings are set",
+            "A capture happens on a copy of the scene, which is thrown away: yours stays as it",
+            "is. On the copy these are set; `capture.json` says what they were. Output settings are set",
             "as well: a 32-bit float EXR, with nothing laid over the picture. The world is black.",
             "Light groups, AOVs and passes are the capture's own.",
             "",
