@@ -102,7 +102,7 @@ def test_a_table_that_runs_in_circles_ends(tmp_path: Path) -> None:
     """Offsets that lead back into the table itself."""
     path = tmp_path / "a.exr"
     data = bytearray(made(path, 1, "ZIP"))
-    _, table = exr_layout._headers(data, False, False)
+    _, table = exr_layout._headers(bytes(data), False, False)
     first = struct.unpack_from("<Q", data, table)[0]
     assert first > table
     struct.pack_into("<Q", data, table, table + 8)
