@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import exr
-from .errors import ArtoError, CaptureSetError, ExrError
+from .description import Description
+from .errors import CaptureSetError, ExrError, HemicubeError, PatternError
 from .files import write_text
 from .hemicube import Hemicube
 from .patterns import PatternSet, pattern_set
@@ -75,32 +76,43 @@ class CaptureSet:
         path = folder / HEADER
         if not path.is_file():
             raise CaptureSetError(f"there is no capture set in {folder}: run Capture first")
-        try:
-            self.head: dict[str, Any] = json.loads(path.read_text())
-            version = self.head["version"]
-        except (OSError, ValueError, KeyError, TypeError) as e:
-            raise CaptureSetError(f"{path} cannot be read ({e}): capture again") from e
-        if version != VERSION:
+        said = Description(path, lambda text: CaptureSetError(f"{text}: capture again"))
+        self.head: dict[str, Any] = said.data
+        if "version" not in said.data:
+            raise said.error(f"{path} cannot be read (it has no version)")
+        version = said.data["version"]
+        if type(version) is not int or version != VERSION:
             raise CaptureSetError(
-                f"{folder} is a capture set of version {version}; this ARTO reads version "
+                f"{folder} is a capture set of version {version!s:.20}; this ARTO reads version "
                 f"{VERSION}: capture again, or use the ARTO that made it"
             )
         try:
-            self.hemicube = Hemicube.from_json(self.head["hemicube"])
-            self.patterns: PatternSet = pattern_set(self.head["patterns"])
-            self.shape = (int(self.head["height"]), int(self.head["width"]))
-            self.regions = [Region(*t["region"]) for t in self.head["tiles"]]
-            self.files = [list(t["files"]) for t in self.head["tiles"]]
-            done = [bool(t["done"]) for t in self.head["tiles"]]
-        except (KeyError, TypeError, ValueError) as e:
-            raise CaptureSetError(f"{path} lacks {e}: capture again") from e
-        except ArtoError as e:
+            self.hemicube = Hemicube.from_json(said.kind("hemicube", dict, {}))
+            self.patterns: PatternSet = pattern_set(said.kind("patterns", str, ""))
+        except (HemicubeError, PatternError) as e:
             raise CaptureSetError(f"{path} is damaged ({e}): capture again") from e
+        self.shape = said.shape()
+        self.regions, self.files, done = [], [], []
+        for region, entry in said.tiles():
+            files = entry.get("files")
+            if not isinstance(files, list) or not isinstance(entry.get("done"), bool):
+                raise said.wrong("tiles", entry)
+            self.regions.append(region)
+            self.files.append([said.file_name(name, "files") for name in files])
+            done.append(entry["done"])
+        self.samples: float | None = said.number("samples", 0.0) or None
+        said.texts("fingerprint")
+        for name, kind in (
+            ("key", str), ("view_layer", str), ("shot", dict), ("route", str), ("grain", bool),
+        ):  # fmt: skip
+            said.kind(name, kind)
         if not unfinished and not all(done):
             raise CaptureSetError(
                 f"{folder} is unfinished ({sum(done)} of {len(done)} tiles): run Capture again, "
                 "it goes on from there"
             )
+        if all(done):
+            said.check_apart(self.regions)
 
     @property
     def pixels(self) -> int:

@@ -6,7 +6,6 @@ are mapped, not read, until they are used. docs/field-format.md says enough to w
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import ArtoError, FieldError
+from .description import Description
+from .errors import FieldError, HemicubeError
 from .hemicube import Hemicube
 from .region import Region
 from .supports import BY_CODE, Support
@@ -24,6 +24,11 @@ VERSION = 1
 HEADER = "field.json"
 # Beside the models' arrays, what relighting reads.
 _OTHERS = ("codes", "scales", "rest", "rest_weights")
+# What others ask a field's `about` for.
+_ABOUT: dict[str, type | tuple[type, ...]] = {
+    "shot": dict, "fingerprint": dict, "view_layer": str, "key": str, "route": str, "choice": str,
+    "samples": (int, float), "far": bool,
+}  # fmt: skip
 LAYERS = ("own", "alpha", "albedo", "normal", "depth")
 
 
@@ -43,11 +48,8 @@ class Entries:
 class Tile:
     """One tile of an opened field; arrays stay on disk until asked for."""
 
-    def __init__(self, folder: Path, entry: dict[str, Any], patches: int) -> None:
-        self.folder = folder / entry["folder"]
-        self.region = Region(*entry["region"])
-        self.used: dict[str, int] = entry["entries"]
-        self.patches = patches
+    def __init__(self, folder: Path, region: Region, used: dict[str, int], patches: int) -> None:
+        self.folder, self.region, self.used, self.patches = folder, region, used, patches
 
     def _load(self, name: str, shape: tuple[int, ...] | None = None) -> NDArray:
         path = self.folder / f"{name}.npy"
@@ -143,32 +145,48 @@ class Field:
         path = folder / HEADER
         if not path.is_file():
             raise FieldError(f"there is no reflectance field in {folder}: run Fit first")
-        try:
-            self.head: dict[str, Any] = json.loads(path.read_text())
-            version = self.head["version"]
-        except (OSError, ValueError, KeyError, TypeError) as e:
-            raise FieldError(f"{path} cannot be read ({e}): fit again") from e
-        if version != VERSION:
+        said = Description(path, lambda text: FieldError(f"{text}: fit again"))
+        self.head: dict[str, Any] = said.data
+        if "version" not in said.data:
+            raise said.error(f"{path} cannot be read (it has no version)")
+        version = said.data["version"]
+        if type(version) is not int or version != VERSION:
             raise FieldError(
-                f"{folder} is a field of version {version}; this ARTO reads version {VERSION}: "
-                "fit again from the capture set"
+                f"{folder} is a field of version {version!s:.20}; this ARTO reads version "
+                f"{VERSION}: fit again from the capture set"
             )
         try:
-            self.hemicube = Hemicube.from_json(self.head["hemicube"])
-            self.shape = (int(self.head["height"]), int(self.head["width"]))
-            self.tiles = [Tile(folder, t, len(self.hemicube)) for t in self.head["tiles"]]
-        except (KeyError, TypeError, ValueError) as e:
-            raise FieldError(f"{path} lacks {e}: fit again") from e
-        except ArtoError as e:
+            self.hemicube = Hemicube.from_json(said.kind("hemicube", dict, {}))
+        except HemicubeError as e:
             raise FieldError(f"{path} is damaged ({e}): fit again") from e
+        self.shape = said.shape()
+        patches = len(self.hemicube)
+        self.tiles = []
+        for region, entry in said.tiles():
+            name = said.file_name(entry.get("folder"), "folder")
+            used = entry.get("entries")
+            if not isinstance(used, dict):
+                raise said.wrong("entries", used)
+            for model in used:
+                said.whole(model, 0, region.pixels * patches, used)
+            self.tiles.append(Tile(folder / name, region, used, patches))
+        said.check_apart([tile.region for tile in self.tiles])
+        about = said.kind("about", dict, {})
+        for name, kind in _ABOUT.items():
+            value = about.get(name)
+            if value is not None and not isinstance(value, kind):
+                raise said.wrong(name, value)
+        things = about.get("fingerprint") or {}
+        if any(not isinstance(text, str) for text in things.values()):
+            raise said.wrong("fingerprint", things)
 
     @property
     def about(self) -> dict[str, Any]:
-        return self.head.get("about", {})
+        return self.head.get("about") or {}
 
     def shares(self) -> dict[str, float]:
         """Which share of all pixel-patch pairs each model took, 'nothing' included."""
-        total = sum(t.region.pixels for t in self.tiles) * len(self.hemicube)
+        total = max(sum(t.region.pixels for t in self.tiles) * len(self.hemicube), 1)
         out: dict[str, float] = {}
         for tile in self.tiles:
             for name, count in tile.used.items():
@@ -181,7 +199,7 @@ class Field:
         names = [f"{n}_{w}" for n in self.shares() for w in ("coefficient", "parameters")]
         files = [t.folder / f"{name}.npy" for t in self.tiles for name in [*names, *_OTHERS]]
         size = sum(f.stat().st_size for f in files if f.is_file())
-        return size / sum(t.region.pixels for t in self.tiles)
+        return size / max(sum(t.region.pixels for t in self.tiles), 1)
 
     def has_layer(self, name: str) -> bool:
         """Whether every tile has the layer."""

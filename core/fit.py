@@ -84,7 +84,7 @@ def fit(
     there. Raises CaptureSetError, FieldError, PatternError.
     """
     choices.check(choice, captured.patterns, separate)
-    samples = captured.head.get("samples")
+    samples = captured.samples
     patterns, extents = captured.patterns, captured.hemicube.extents
     begun = time.perf_counter()
     reading = 0.0

@@ -70,7 +70,10 @@ class Hemicube:
             raise HemicubeError(f"no face '{unknown[0]}': choose from {', '.join(FACES)}")
         if not 1 <= self.patches <= 16:
             raise HemicubeError(f"{self.patches} patches a side: choose 1 to 16")
-        for face, n, row, column in self.leaves:
+        for leaf in self.leaves:
+            if len(leaf) != 4:
+                raise HemicubeError(f"a patch is a face and three numbers, not {leaf!r:.60}")
+            face, n, row, column = leaf
             inside = n in LEAF_SIDES and 0 <= row < n and 0 <= column < n
             if face not in self.faces or not inside:
                 raise HemicubeError(f"no patch {row},{column} of {n}x{n} on the face '{face}'")
@@ -93,20 +96,32 @@ class Hemicube:
 
     @staticmethod
     def from_json(data: dict[str, Any]) -> Hemicube:
+        def number(value: Any, kinds: tuple[type, ...] = (int, float)) -> Any:
+            if type(value) not in kinds or not math.isfinite(value):
+                raise TypeError(f"{value!r:.40} is no number")
+            return value
+
         try:
+            leaves = data.get("leaves") or ()
+            if len(leaves) > len(FACES) * FINEST**2:
+                raise ValueError(f"{len(leaves)} patches")
+            half = data["half_sides"]
+            if not isinstance(half, bool):
+                raise TypeError(f"half_sides is {half!r:.40}")
+            x, y, z = (float(number(x)) for x in data["centre"])
             return Hemicube(
-                faces=tuple(data["faces"]),
-                patches=int(data["patches"]),
-                half_sides=bool(data["half_sides"]),
-                orientation=tuple(tuple(float(x) for x in row) for row in data["orientation"]),
-                centre=tuple(float(x) for x in data["centre"]),  # type: ignore[arg-type]
-                size=float(data["size"]),
-                leaves=tuple(
-                    (str(f), int(n), int(r), int(c)) for f, n, r, c in data.get("leaves", ())
+                faces=tuple(str(f) for f in data["faces"][: len(FACES) + 1]),
+                patches=number(data["patches"], (int,)),
+                half_sides=half,
+                orientation=tuple(
+                    tuple(float(number(x)) for x in row[:4]) for row in data["orientation"][:4]
                 ),
+                centre=(x, y, z),
+                size=float(number(data["size"])),
+                leaves=tuple((str(f), *(number(n, (int,)) for n in rest)) for f, *rest in leaves),
             )
-        except (KeyError, TypeError, ValueError) as e:
-            raise HemicubeError(f"this is not the description of a hemicube: {e!r}") from None
+        except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as e:
+            raise HemicubeError(f"this is not the description of a hemicube: {e!r:.200}") from None
 
     def _rows(self, face: str) -> int:
         if self.half_sides and face in SIDES:

@@ -7,6 +7,7 @@ the frame, the size. What the scene looks like is not part of it: that is its fi
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 from dataclasses import asdict, dataclass, fields
 from typing import Any
@@ -105,6 +106,10 @@ class Shot:
             value = getattr(out, name)
             if not isinstance(value, kind) or isinstance(value, bool):
                 raise ShotError(f"a shot's {name} cannot be {value!r:.60}")
+        numbers = (*out.camera_matrix, *(out.region or ()), out.subframe or 0, out.frame)
+        plain = all(type(x) in (int, float) and math.isfinite(x) for x in numbers)
+        if not plain or not all(isinstance(x, int | float | str) for x in out.lens):
+            raise ShotError("a shot's camera, lens or region is no row of numbers")
         return out
 
     @property
