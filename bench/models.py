@@ -30,10 +30,9 @@ from .worlds import World
 
 OUT = Path("out/models")
 PACKAGE = Path(arto.__file__).parent
-# The code that decides what a capture set holds.
-DECIDES = [f"arto_addon/{n}" for n in ("capture", "hemicube_planes", "properties", "probe")]
-DECIDES += ["arto_addon/bounds", "arto_addon/stage"]
-DECIDES += ["core/refine", "core/hemicube", "core/patterns"]
+# The code that decides what a capture set holds: files, and folders of them.
+DECIDES = ("arto_addon/capture", "arto_addon/stage")
+DECIDES += ("core/refine.py", "core/hemicube.py", "core/patterns.py")
 STAGE = "whole 16x16"
 MATTE = "matte"
 AUTO_RGB = "auto per channel"
@@ -43,7 +42,9 @@ def captured(
     scene_name: str, size: tuple[int, int], samples: int, seed: int = 0, **settings: Any
 ) -> CaptureSet:
     """The capture set of a scene under these settings, kept by content."""
-    code = [(PACKAGE / f"{name}.py").read_text() for name in DECIDES]
+    parts = [PACKAGE / name for name in DECIDES]
+    files = [f for part in parts for f in (sorted(part.glob("*.py")) if part.is_dir() else [part])]
+    code = [f.read_text() for f in files]
     key = reference.content_key(
         scene=scene_name, size=size, samples=samples, seed=seed, settings=settings, code=code
     )

@@ -13,6 +13,7 @@ from . import choice as choices
 from .capture_set import CaptureSet, TileData
 from .evidence import evidence
 from .field_writer import FieldWriter, TileWriter
+from .hemicube import Hemicube
 from .moments import Moments, channel_sum
 from .patterns import PatternSet
 from .search import search
@@ -22,6 +23,7 @@ from .supports import BOX, WHOLE
 def fit_tile(
     data: TileData,
     patterns: PatternSet,
+    hemicube: Hemicube,
     choice: str,
     samples: float | None = None,
     separate: bool = False,
@@ -42,22 +44,27 @@ def fit_tile(
     if choice == choices.STAGE_AND_MATTE:
         brightest = channel_sum(coefficients).argmax(axis=0)
     for k in range(patches):
+        extent = hemicube.extent(k)
         if choice == choices.SEARCH:
-            codes, _ = choices.choose("whole", images[k], coefficients[k], patterns, known, k)
-            boxes = search(images[k], patterns, data.region.height)
+            codes, _ = choices.choose(
+                "whole", images[k], coefficients[k], patterns, known, k, extent
+            )
+            boxes = search(images[k], patterns, extent, data.region.height)
             parameters = {BOX.code: boxes[codes == WHOLE.code]}
             codes[codes == WHOLE.code] = BOX.code
         elif brightest is not None:
             # the straightforward combination: a Light Stage, and one matte where it is brightest
-            codes, _ = choices.choose("whole", images[k], coefficients[k], patterns, known, k)
+            codes, _ = choices.choose(
+                "whole", images[k], coefficients[k], patterns, known, k, extent
+            )
             codes[(brightest == k) & (codes == WHOLE.code)] = BOX.code
             parameters = {
-                s.code: s.fit(Moments.from_basis(images[k][:, codes == s.code], patterns))
+                s.code: s.fit(Moments.from_basis(images[k][:, codes == s.code], patterns, extent))
                 for s in (WHOLE, BOX)
             }
         else:
             codes, parameters = choices.choose(
-                choice, images[k], coefficients[k], patterns, known, k, separate
+                choice, images[k], coefficients[k], patterns, known, k, extent, separate
             )
         writer.add(codes, coefficients[k], parameters)
         yield (k + 1) / patches
@@ -94,7 +101,9 @@ def fit(
             start = time.perf_counter()
             data = captured.read(tile)
             reading += time.perf_counter() - start
-            for step in fit_tile(data, captured.patterns, choice, samples, separate):
+            for step in fit_tile(
+                data, captured.patterns, captured.hemicube, choice, samples, separate
+            ):
                 if isinstance(step, TileWriter):
                     writer.add(step)
                 else:

@@ -1,6 +1,7 @@
-"""The box: an axis-aligned rectangle, uniform inside (paper 3 and 5), in closed form.
+"""The box: an axis-aligned rectangle, uniform inside (paper 3 and 5), from its moments.
 
-A uniform box of centre mu and half width a has E[u] = mu and E[u^2] = mu^2 + a^2 / 3: the paper's
+A uniform box of centre mu and half width a has E[u] = mu and E[u^2] = mu^2 + a^2 / 3, where its
+patch is so small that area and solid angle are one; `solid_angle` finds the box on any. The paper's
 search finds the same minimum where its patterns can see it.
 """
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from ..light import PatchLight
 from ..moments import Moments
 from ..patterns import ONE, UU, VV, U, V
+from ..solid_angle import fit_boxes
 
 
 class Box:
@@ -21,12 +23,7 @@ class Box:
     needs: tuple[int, ...] = (ONE, U, UU, V, VV)
 
     def fit(self, moments: Moments) -> NDArray:
-        edges = []
-        for mean, variance in zip(moments.mean, moments.variance, strict=True):
-            half = np.sqrt(3 * variance)
-            edges += [mean - half, mean + half]
-        # light that comes from both rims is spread wider than any box: cut at the patch
-        return np.clip(np.stack(edges, axis=-1), 0, 1)
+        return fit_boxes(moments.mean, moments.variance, moments.extent)
 
     def average(self, light: PatchLight, k: int, parameters: NDArray) -> NDArray:
         u0, u1, v0, v1 = parameters.astype(np.float64).T

@@ -18,6 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 MOMENTS = pattern_set("moments")
+FLAT = (-1e-6, 1e-6, -1e-6, 1e-6)
 
 
 def known(coefficients: np.ndarray, samples: float | None = None) -> Evidence:
@@ -30,10 +31,12 @@ def alone(
     basis: np.ndarray,
     patterns: PatternSet = MOMENTS,
     samples: float | None = None,
+    extent: tuple[float, float, float, float] = FLAT,
 ) -> tuple[np.ndarray, dict[int, np.ndarray]]:
     """The choice where this patch is the only one. basis: (P, n, 3)."""
     coefficient = patterns.coefficient(basis)
-    return choose(choice, basis, coefficient, patterns, known(coefficient[None], samples), 0)
+    evident = known(coefficient[None], samples)
+    return choose(choice, basis, coefficient, patterns, evident, 0, extent)
 
 
 def test_no_light_is_no_entry() -> None:
@@ -63,6 +66,34 @@ def test_auto_takes_the_plane_for_broad_light_and_the_box_for_narrow(planted) ->
     np.testing.assert_allclose(parameters[LINEAR.code], [[0.55, 0.5], [0.5, 0.25]], atol=1e-9)
 
 
+@pytest.mark.parametrize("cube", [Hemicube(patches=n) for n in (1, 2, 4, 16)], ids=len)
+def test_what_sees_its_whole_patch_evenly_is_the_whole_patch(planted, cube: Hemicube) -> None:
+    """Evenly by solid angle: the mean is off the patch's middle, by 0.074 on one of 2x2. What is
+    even over the face's area instead is not the whole patch, where the two differ."""
+    for k in (0, 1, len(cube) // 2, len(cube) - 1):
+        extent = cube.extent(k)
+        for share in (False, True):
+            basis = planted(MOMENTS, [[0, 1, 0, 1]], np.ones((1, 3)), extent)
+            coefficient = MOMENTS.coefficient(basis)
+            evident = known(coefficient[None], 1000)
+            codes, _ = choose("auto", basis, coefficient, MOMENTS, evident, 0, extent, share)
+            assert codes.tolist() == [WHOLE.code]
+    if len(cube) == 24:
+        by_area = planted(MOMENTS, [[0, 1, 0, 1]], np.ones((1, 3)))
+        assert alone("auto", by_area, samples=1000, extent=extent)[0].tolist() == [LINEAR.code]
+
+
+@pytest.mark.parametrize(
+    "extent", [(-1.0, 1.0, -1.0, 1.0), (0.0, 1.0, 0.0, 1.0), (0.5, 1.0, 0, 0.5)]
+)
+def test_broad_is_a_width_of_the_box_on_any_patch(planted, extent) -> None:
+    """The same box is broad or not, however solid angle bends its spread."""
+    for half, support in ((BROAD - 0.005, BOX), (BROAD + 0.005, LINEAR)):
+        box = np.array([[0, 2 * half, 0, 2 * half], [1 - 2 * half, 1, 0.1, 0.1 + 2 * half]])
+        basis = planted(MOMENTS, box, np.ones((2, 3)), extent)
+        assert alone("auto", basis, extent=extent)[0].tolist() == [support.code] * 2
+
+
 def test_evidence_decides(planted) -> None:
     """Few hits show neither a middle nor a box: the mean is kept as it is, unbiased. Many show a
     middle that is one, and a box that is one."""
@@ -87,7 +118,7 @@ def test_hits_are_counted_by_the_share_of_the_light(planted) -> None:
         rest = np.full((1, 1, 3), 1 / share - 1)
         found = known(np.concatenate([np.ones((1, 1, 3)), rest]), 64)
         assert found.hits(0, np.ones((1, 3))) == pytest.approx(64 * share)
-        codes.append(choose("auto", basis, np.ones((1, 3)), MOMENTS, found, 0)[0][0])
+        codes.append(choose("auto", basis, np.ones((1, 3)), MOMENTS, found, 0, FLAT)[0][0])
     assert codes == [BOX.code, BOX.code, LINEAR.code]
 
 
@@ -118,7 +149,7 @@ def test_what_is_dropped_stays_under_its_share(planted, seed: int, patches: int)
     kept = np.empty((patches, 20), bool)
     for k, c in enumerate(r):
         basis = planted(MOMENTS, box, c).astype(np.float32)
-        kept[k] = choose("auto", basis, c, MOMENTS, everything, k)[0] != NOTHING
+        kept[k] = choose("auto", basis, c, MOMENTS, everything, k, FLAT)[0] != NOTHING
     size = r.sum(axis=-1, dtype=np.float64)
     dropped = np.where(kept, 0, size).sum(axis=0)
     assert (dropped <= DROPPED * size.sum(axis=0)).all()
@@ -135,7 +166,7 @@ def test_what_is_dropped_of_a_tile_stays_under_its_share(
     for seed in range(20):
         made = scene(Hemicube(patches=2), shape, patterns, seed, unlit=0.9)
         data = CaptureSet(write_scene(tmp_path / f"{seed}", made)).read(0)
-        *_, tile = fit_tile(data, made.patterns, "auto")
+        *_, tile = fit_tile(data, made.patterns, made.hemicube, "auto")
         kept = np.stack(tile.codes) != NOTHING
         size = made.coefficient.sum(axis=-1).reshape(kept.shape)
         dropped = np.where(kept, 0, size).sum(axis=0)

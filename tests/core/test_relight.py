@@ -44,6 +44,13 @@ def truth(made, light: PatchLight, own: float = 1.0) -> np.ndarray:
     return out
 
 
+def means(box_moments, k: int, boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean places along u and v of boxes (..., 4), even in solid angle -> two of (..., 1)."""
+    boxes = np.asarray(boxes, np.float64)
+    m = box_moments(boxes.reshape(-1, 4), CUBE.extent(k)).reshape(6, *boxes.shape[:-1], 1)
+    return m[U], m[V]
+
+
 def close_but_for_what_was_dropped(found: np.ndarray, expected: np.ndarray, choice: str) -> None:
     """`auto` drops entries up to a share of the pixel's light, summed over channels."""
     dropped = DROPPED * expected.sum(axis=-1, keepdims=True) if choice == "auto" else 0
@@ -79,13 +86,13 @@ def test_boxes_pick_their_light_from_the_map(fields, made, noisy) -> None:
     assert np.abs(whole / truth(made, light) - 1).max() > 0.2
 
 
-def test_linear_and_whole_are_what_they_say(fields, made, noisy) -> None:
+def test_linear_and_whole_are_what_they_say(fields, made, noisy, box_moments) -> None:
     light = PatchLight(noisy(1), CUBE)
     plane = light.polynomial((ONE, U, V))
     linear, whole = (made.own.astype(np.float64) for _ in range(2))
     for k in range(len(CUBE)):
         b, r = made.boxes[k], made.coefficient[k]
-        mu, mv = (b[..., :1] + b[..., 1:2]) / 2, (b[..., 2:3] + b[..., 3:]) / 2
+        mu, mv = means(box_moments, k, b)
         linear = linear + r * (plane[k, 0] + mu * plane[k, 1] + mv * plane[k, 2])
         whole = whole + r * light.whole[k]
     np.testing.assert_allclose(relight(fields["linear"], light)[..., :3], linear, rtol=2 * HALF)
@@ -93,15 +100,21 @@ def test_linear_and_whole_are_what_they_say(fields, made, noisy) -> None:
 
 
 def test_auto_is_the_box_where_it_is_narrow_both_ways_and_the_plane_elsewhere(
-    fields, made, noisy
+    fields, made, noisy, box_moments
 ) -> None:
     light = PatchLight(noisy(2), CUBE)
     size = made.boxes[..., 1::2] - made.boxes[..., ::2]
     broad = (size > 2 * BROAD).any(axis=-1)
     codes = fields["auto"].tiles[0].codes.reshape(broad.shape)
     lit = codes != NOTHING
-    # a broad light whose mean is the middle is the whole patch
-    off = np.hypot(made.boxes[..., :2].mean(axis=-1) - 0.5, made.boxes[..., 2:].mean(axis=-1) - 0.5)
+    # a broad light whose mean is that of the whole patch is the whole patch
+    off = np.empty(broad.shape)
+    for k in range(len(CUBE)):
+        mean, whole = (
+            means(box_moments, k, made.boxes[k]),
+            means(box_moments, k, np.array([0, 1, 0, 1])),
+        )
+        off[k] = np.hypot(*(m - w for m, w in zip(mean, whole, strict=True)))[..., 0]
     flat = np.where(off < CENTRED, WHOLE.code, LINEAR.code)
     np.testing.assert_array_equal(codes[lit], np.where(broad, flat, BOX.code)[lit])
     assert (lit & broad).sum() > 20 and (lit & ~broad).sum() > 20
@@ -110,7 +123,7 @@ def test_auto_is_the_box_where_it_is_narrow_both_ways_and_the_plane_elsewhere(
     for k in range(len(CUBE)):
         b = made.boxes[k]
         box = light.box(k, *b.reshape(-1, 4).T).reshape(6, 8, 3)
-        mu, mv = (b[..., :1] + b[..., 1:2]) / 2, (b[..., 2:3] + b[..., 3:]) / 2
+        mu, mv = means(box_moments, k, b)
         flat = plane[k, 0] + mu * plane[k, 1] + mv * plane[k, 2]
         flat = np.where((off[k] < CENTRED)[..., None], light.whole[k], flat)
         r = made.coefficient[k] * lit[k][..., None]
