@@ -128,6 +128,22 @@ def _patterns(options: argparse.Namespace) -> None:
         print(f"| `{s.name}` | {len(s)} | {s.rank} | {s.condition:.1f} | {', '.join(told)} |")
 
 
+def _snapshot(options: argparse.Namespace) -> None:
+    from .machine import write_rows
+    from .snapshot import snapshot, table
+
+    rows = snapshot(options.megabytes)
+    if options.json:
+        write_rows(options.json, rows)
+    print(table(rows))
+
+
+def _settings(options: argparse.Namespace) -> None:
+    from .settings import run, table
+
+    print(table(run(options.json, options.part, options.seed, options.only)))
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
@@ -195,6 +211,18 @@ def main() -> int:
     c.add_argument("--samples", type=int, default=8192)
     c.add_argument("--many", type=int, default=2048)
     c.set_defaults(run=_colour)
+
+    c = commands.add_parser("snapshot", help="what starting a job costs the window")
+    c.add_argument("--json", type=Path)
+    c.add_argument("--megabytes", type=int, nargs="+", default=[0, 100, 1000])
+    c.set_defaults(run=_snapshot)
+
+    c = commands.add_parser("settings", help="every setting of a scene against Cycles")
+    c.add_argument("--json", type=Path)
+    c.add_argument("--part", type=float, default=1.0, help="a random share of them, 0 to 1")
+    c.add_argument("--seed", type=int, default=0, help="which share")
+    c.add_argument("--only", nargs="+", help="owners, or owner.setting")
+    c.set_defaults(run=_settings)
 
     c = commands.add_parser("patterns", help="what each set of patterns can identify")
     c.set_defaults(run=_patterns)

@@ -25,6 +25,7 @@ from arto.core import exr, lamps, matte, metrics
 from arto.core.choice import CHOICES
 from arto.core.environment import Environment
 from arto.core.field import Field
+from arto.core.files import whole, write_text
 from arto.core.light import PatchLight
 from arto.core.relight import relight as relight_field
 from numpy.typing import NDArray
@@ -71,10 +72,8 @@ def rerendered(scene_name: str, world: World, size: tuple[int, int], samples: in
     scene.view_layers[0].cycles.denoising_store_passes = True
     parts, _ = reference.render_passes(scene, samples, SEED, denoise=True)
     both = np.stack([parts["Noisy Image"][..., :3], parts["Combined"][..., :3]])
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(".part.npy")
-    np.save(partial, both)
-    partial.replace(path)
+    with whole(path) as partial, partial.open("wb") as file:
+        np.save(file, both)
     return both
 
 
@@ -263,10 +262,7 @@ def accuracy(
     def keep() -> None:
         measured = {name: Times.from_json(t) for name, t in there["times"].items()}
         price([r for r in rows if r["scene"] in measured], measured, samples)
-        state.parent.mkdir(parents=True, exist_ok=True)
-        partial = state.with_suffix(".part")
-        partial.write_text(json.dumps(there))
-        partial.replace(state)
+        write_text(state, json.dumps(there))
         write_rows(out, rows)
 
     scene_names = list(scene_names)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from arto.core.files import write_text
 
 
 def machine() -> dict[str, Any]:
@@ -26,7 +27,4 @@ def machine() -> dict[str, Any]:
 
 def write_rows(path: Path, rows: list[dict[str, Any]]) -> None:
     """Write `{"machine": ..., "rows": ...}`, whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".part")
-    partial.write_text(json.dumps({"machine": machine(), "rows": rows}, indent=1))
-    partial.replace(path)
+    write_text(path, json.dumps({"machine": machine(), "rows": rows}, indent=1))

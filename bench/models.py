@@ -13,7 +13,6 @@ import bpy
 import numpy as np
 from arto.arto_addon import work
 from arto.arto_addon.capture import capture
-from arto.arto_addon.shot import paths
 from arto.arto_addon.world.bake import bake
 from arto.core import matte, metrics
 from arto.core.capture_set import CaptureSet
@@ -30,9 +29,12 @@ from .worlds import World
 
 OUT = Path("out/models")
 PACKAGE = Path(arto.__file__).parent
-# The code that decides what a capture set holds: files, and folders of them.
-DECIDES = ("arto_addon/capture", "arto_addon/stage")
-DECIDES += ("core/refine.py", "core/hemicube.py", "core/patterns.py")
+# The code that decides what a capture set holds.
+DECIDES = [
+    p for n in ("capture", "stage") for p in sorted((PACKAGE / "arto_addon" / n).glob("*.py"))
+]
+DECIDES += [PACKAGE / "core" / f"{n}.py" for n in ("refine", "hemicube", "patterns")]
+DECIDES += [PACKAGE / "arto_addon" / "ui" / "properties.py"]
 STAGE = "whole 16x16"
 MATTE = "matte"
 AUTO_RGB = "auto per channel"
@@ -42,9 +44,7 @@ def captured(
     scene_name: str, size: tuple[int, int], samples: int, seed: int = 0, **settings: Any
 ) -> CaptureSet:
     """The capture set of a scene under these settings, kept by content."""
-    parts = [PACKAGE / name for name in DECIDES]
-    files = [f for part in parts for f in (sorted(part.glob("*.py")) if part.is_dir() else [part])]
-    code = [f.read_text() for f in files]
+    code = [path.read_text() for path in DECIDES]
     key = reference.content_key(
         scene=scene_name, size=size, samples=samples, seed=seed, settings=settings, code=code
     )
@@ -53,10 +53,11 @@ def captured(
     for name, value in {"samples": samples, "seed": seed, "folder": "", **settings}.items():
         setattr(scene.arto, name, value)
     scene.arto.folder = str(folder.resolve())
-    there = paths.capture_folder(scene)
-    if not (there / "capture.json").is_file():
-        work.run(capture.capture(scene, scene.view_layers[0].name))
-    return CaptureSet(there)
+    # by its content: whatever scene it was captured from is this one
+    there = next(folder.glob("*/*/*/capture/capture.json"), None)
+    if there is None:
+        return CaptureSet(work.run(capture.capture(scene, scene.view_layers[0].name)))
+    return CaptureSet(there.parent)
 
 
 def fitted(source: CaptureSet, choice: str, separate: bool = False) -> Field:

@@ -19,6 +19,7 @@ import bpy
 import numpy as np
 from arto.arto_addon.blender.output import float_exr
 from arto.core import exr
+from arto.core.files import whole
 from numpy.typing import NDArray
 
 from . import building, hard_scenes, scenes, worlds
@@ -108,14 +109,12 @@ def reference(
     scene = make()
     world.apply(scene)
     picture = render(scene, samples, seed, denoise)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(".part.npz")
-    np.savez(
-        partial,
-        rgb=picture.rgb,
-        alpha=picture.alpha,
-        index=picture.index,
-        seconds=np.float64(picture.seconds),
-    )
-    partial.replace(path)
+    with whole(path) as partial, partial.open("wb") as file:
+        np.savez(
+            file,
+            rgb=picture.rgb,
+            alpha=picture.alpha,
+            index=picture.index,
+            seconds=np.float64(picture.seconds),
+        )
     return picture

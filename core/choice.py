@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 
 from .errors import FieldError
 from .evidence import Evidence
+from .measure import Extent
 from .moments import Moments
 from .patterns import ONE, UU, VV, PatternSet, U, V
-from .solid_angle import Extent
 from .supports import BOX, LINEAR, NOTHING, PER_CHANNEL, SUPPORTS, WHOLE, Support
 
 SEARCH = "search"

@@ -22,6 +22,8 @@ from .supports import BY_CODE, Support
 
 VERSION = 1
 HEADER = "field.json"
+# Beside the models' arrays, what relighting reads.
+_OTHERS = ("codes", "scales", "rest", "rest_weights")
 LAYERS = ("own", "alpha", "albedo", "normal", "depth")
 
 
@@ -98,9 +100,18 @@ class Tile:
     def _scales(self) -> NDArray[np.float32]:
         return np.asarray(self._load("scales", (self.patches,)))
 
+    @cached_property
+    def rest(self) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
+        """What was dropped, too small to be an entry: coefficients (n, 3), and each patch's weight
+        (K, 3) in the light that they go with; None in a field without."""
+        if not (self.folder / "rest.npy").is_file():
+            return None
+        rest = self._load("rest", (self.region.pixels, 3))
+        return rest.astype(np.float32), np.asarray(self._load("rest_weights", (self.patches, 3)))
+
     def open(self) -> None:
         """Map all that `entries` needs. Raises FieldError."""
-        _ = self.codes, self._arrays, self._scales
+        _ = self.codes, self._arrays, self._scales, self.rest
 
     def entries(self, k: int) -> list[Entries]:
         """The entries of patch k, model by model."""
@@ -168,9 +179,7 @@ class Field:
     def bytes_per_pixel(self) -> float:
         """What relighting reads: coefficients, supports and codes, on disk."""
         names = [f"{n}_{w}" for n in self.shares() for w in ("coefficient", "parameters")]
-        files = [
-            t.folder / f"{name}.npy" for t in self.tiles for name in [*names, "codes", "scales"]
-        ]
+        files = [t.folder / f"{name}.npy" for t in self.tiles for name in [*names, *_OTHERS]]
         size = sum(f.stat().st_size for f in files if f.is_file())
         return size / sum(t.region.pixels for t in self.tiles)
 

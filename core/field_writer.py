@@ -15,7 +15,10 @@ from .field import HEADER, VERSION
 from .files import PART, replace_folder
 from .hemicube import Hemicube
 from .region import Region
-from .supports import BY_CODE
+from .supports import BY_CODE, NOTHING
+
+# A patch's brightest coefficient in its units: under the largest half float.
+LARGEST = 6e4
 
 
 class TileWriter:
@@ -27,11 +30,23 @@ class TileWriter:
         self.codes: list[NDArray] = []
         self.scales: list[float] = []
         self.parts: dict[int, tuple[list[NDArray], list[NDArray]]] = {}
+        # what was dropped: by pixel, and by patch
+        self.rest: NDArray[np.float64] = np.zeros((region.pixels, 3))
+        self.rest_of: list[NDArray] = []
 
     def add(self, codes: NDArray, coefficient: NDArray, parameters: dict[int, NDArray]) -> None:
         """The next patch: model code (n,), R (n, 3), and each used code's parameters (m, p)."""
-        # half floats are relative to the patch's brightest, so that any exposure fits them
-        scale = float(coefficient.max(initial=0)) or 1.0
+        # half floats are relative to the patch's brightest, so that any exposure fits them; that is
+        # at their upper end, so that a firefly leaves nine decades below it their precision
+        scale = float(coefficient.max(initial=0)) / LARGEST or 1.0
+        if not np.isfinite(scale):
+            raise FieldError(
+                f"patch {len(self.codes)} has coefficients that are infinite or not a number: "
+                "repair the basis images, or capture again"
+            )
+        dropped = coefficient * (codes == NOTHING)[:, None]
+        self.rest += dropped
+        self.rest_of.append(dropped.sum(axis=0, dtype=np.float64))
         self.codes.append(codes)
         self.scales.append(scale)
         for code, values in parameters.items():
@@ -51,6 +66,12 @@ class TileWriter:
             np.save(folder / f"{name}_coefficient.npy", np.concatenate(r))
             np.save(folder / f"{name}_parameters.npy", np.concatenate(p))
             used[name] = sum(map(len, r))
+        if self.rest.any():
+            scale = self.rest.max() / LARGEST
+            np.save(folder / "rest.npy", (self.rest / scale).astype(np.float16))
+            weights = np.stack(self.rest_of)
+            weights *= scale / np.maximum(weights.sum(axis=0), 1e-300)
+            np.save(folder / "rest_weights.npy", weights.astype(np.float32))
         for name, pixels in self.layers.items():
             dtype = np.float32 if name in ("own", "depth") else np.float16
             np.save(folder / f"{name}.npy", pixels.astype(dtype))

@@ -89,7 +89,7 @@ def fit(
     begun = time.perf_counter()
     reading = 0.0
     keep = ("scene", "colour_space", "samples", "file", "frame", "view_layer", "far", "key")
-    keep += ("fingerprint",)
+    keep += ("fingerprint", "route")
     about = {key: captured.head[key] for key in keep if key in captured.head} | about
     writer = FieldWriter(
         folder, captured.hemicube, captured.shape, choice=choice, separate=separate, **about

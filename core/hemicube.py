@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import HemicubeError
-from .solid_angle import Extent, uniform_moments
+from .measure import Extent, uniform_moments
 
 # name -> (centre, direction of u, direction of v); seen from inside, v is up on the four sides.
 FACES: dict[str, tuple[tuple[int, int, int], ...]] = {

@@ -51,6 +51,11 @@ def _light(tile: Tile, light: PatchLight) -> NDArray[np.float32]:
         total, *others = pool.map(some, range(SUMS))
     for other in others:
         total += other
+    if tile.rest:
+        coefficient, weights = tile.rest
+        # the mean of the dropped patches' light, each as much as was dropped of it in this tile:
+        # what a tile loses or gains by that adds up to nothing, in each channel
+        total += coefficient.T * (light.whole * weights).sum(axis=0).astype(np.float32)[:, None]
     return total.T
 
 

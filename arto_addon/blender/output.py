@@ -2,15 +2,58 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import bpy
+
+# What of a scene's render settings decides how a picture is written, or what is laid over it, and
+# not what is rendered: each as here, whatever the artist's file says.
+_WRITING = {
+    "use_file_extension": False,
+    "use_overwrite": True,
+    "use_placeholder": False,
+    "save_output": True,
+    "use_multiview": False,
+    "use_stamp": False,
+    "use_sequencer": False,
+    "use_freestyle": False,
+    "dither_intensity": 0.0,
+}
+
+
+def _as_new(settings: Any) -> None:
+    """Every setting as a new scene has it; a file brings those of the version that made it."""
+    new = bpy.data.scenes.new("ARTO Output")
+    try:
+        there = new.render.image_settings
+        # what may be chosen for the rest follows from these
+        first = ["media_type", "file_format"]
+        names = [p.identifier for p in there.bl_rna.properties if not p.is_readonly]
+        for name in first + [n for n in names if n not in first]:
+            setattr(settings, name, getattr(there, name))
+    finally:
+        bpy.data.scenes.remove(new)
 
 
 def float_exr(render: bpy.types.RenderSettings, multilayer: bool = True) -> None:
-    """Set a scene's output to 32-bit float EXR."""
+    """Set a scene's output to 32-bit float EXR of a part for each pass, and nothing over it."""
+    for name, value in _WRITING.items():
+        setattr(render, name, value)
     settings = render.image_settings
+    _as_new(settings)
     settings.media_type = "MULTI_LAYER_IMAGE" if multilayer else "IMAGE"
     settings.file_format = "OPEN_EXR_MULTILAYER" if multilayer else "OPEN_EXR"
     settings.color_mode = "RGBA"
     settings.color_depth = "32"
     settings.exr_codec = "NONE"  # files that are read again at once; packing takes longer
+    settings.use_exr_interleave = False  # one part of all layers, as files before Blender 5 have it
     settings.color_management = "FOLLOW_SCENE"
+
+
+def write_to(render: bpy.types.RenderSettings, path: Path) -> None:
+    """Have a scene's next render written to this very path.
+
+    An output path of Blender is a template, in which a brace that is meant stands twice.
+    """
+    render.filepath = str(path).replace("{", "{{").replace("}", "}}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import bpy
@@ -14,8 +15,10 @@ from ...core.capture_set import GRAIN, GROUP, VERSION, describe, group_name, wri
 from ...core.errors import ArtoError, CaptureSetError, SceneError
 from ...core.files import Lock, whole
 from ...core.hemicube import Hemicube
-from ...core.patterns import PatternSet, pattern_set
+from ...core.patterns import pattern_set
+from ...core.refine import check as can_refine
 from ...core.region import Region
+from ..blender.output import write_to
 from ..shot import home, paths
 from ..shot.fingerprint import fingerprint, key_of
 from ..shot.shot import shot_of
@@ -25,7 +28,8 @@ from ..stage.stage import Stage, picture_region, set_region, stage
 from ..work import Progress, Render, Steps
 from . import planes
 from .check import check_scene
-from .plan import render_plan, tiles_of
+from .light_check import check_light
+from .plan import SAMPLED, render_plan, tiles_of
 from .probe import refined
 from .resume import empty, finish, unfinished
 
@@ -111,8 +115,16 @@ def _capture(scene: bpy.types.Scene, view_layer: str, claimed: Path) -> Steps:
         head = unfinished(folder, key)
         if head is None:
             if settings.adaptive:
+                can_refine(hemicube)  # before anything is rendered
+            route, light = settings.route, None
+            if settings.far:
+                # a near hemicube is no world: what it lights differs by what it is near to
+                sampled, light = yield from check_light(on, hemicube)
+                route = SAMPLED if sampled else route
+            if settings.adaptive and route != SAMPLED:
                 hemicube = yield from refined(on, hemicube, ADAPTIVE_SHARE * len(hemicube))
-            plan = render_plan(settings.route, hemicube, names)
+            names = [n for n in names if n != GRAIN or route == "all"]
+            plan = render_plan(route, hemicube, names)
             tiles = tiles_of(region, max(map(len, plan)), settings.memory)
             about = {
                 "scene": scene.name,
@@ -121,7 +133,9 @@ def _capture(scene: bpy.types.Scene, view_layer: str, claimed: Path) -> Steps:
                 "shot": shot.to_json(),
                 "frame": scene.frame_current,
                 "fingerprint": found,
+                "caution": light,
             }
+            decides |= {"route": route, "grain": GRAIN in names}
             head = describe(hemicube, patterns, size, key=key, **decides, **about)
             head["seconds"] = 0.0
             head["tiles"] = [
@@ -129,7 +143,8 @@ def _capture(scene: bpy.types.Scene, view_layer: str, claimed: Path) -> Steps:
             ]
             empty(folder)
         hemicube = Hemicube.from_json(head["hemicube"])
-        plan = render_plan(settings.route, hemicube, names)
+        names = [*patterns.patterns, *([GRAIN] if head["grain"] else [])]
+        plan = render_plan(head["route"], hemicube, names)
         tiles = [Region(*t["region"]) for t in head["tiles"]]
         write_header(folder, head)
         total = len(plan) * len(tiles)
@@ -148,14 +163,18 @@ def _capture(scene: bpy.types.Scene, view_layer: str, claimed: Path) -> Steps:
                 if not _is_whole(folder / name, images):
                     begun = time.perf_counter()
                     work = Render(on.scene.name, at / total, text, 1 / total)
-                    yield from _render(on, hemicube, patterns, images, folder / name, work)
+                    around = planes.lit(
+                        on, hemicube, patterns, images, sampled=head["route"] == SAMPLED
+                    )
+                    yield from _render(on, around, images, folder / name, work)
                     head["seconds"] += time.perf_counter() - begun
                 entry["files"].append(name)
             entry["done"] = True
             write_header(folder, head)
     finish(folder, claimed / "capture")
     paths.forget()
-    yield Progress(1.0, f"captured {len(hemicube)} patches in {total} renders")
+    caution = f". CAUTION: {head['caution']['text']}" if head.get("caution") else ""
+    yield Progress(1.0, f"captured {len(hemicube)} patches in {total} renders{caution}")
     return claimed / "capture"
 
 
@@ -172,16 +191,15 @@ def _is_whole(path: Path, images: list[tuple[int, str]]) -> bool:
 
 def _render(
     on: Stage,
-    hemicube: Hemicube,
-    patterns: PatternSet,
+    around: AbstractContextManager[None],
     images: list[tuple[int, str]],
     path: Path,
     request: Render,
 ) -> Steps:
-    """One render of some basis images into `path`."""
+    """One render of some basis images into `path`; around: has their planes around the stage."""
     with whole(path) as partial:
-        on.scene.render.filepath = str(partial)
-        with planes.lit(on, hemicube, patterns, images):
+        write_to(on.scene.render, partial)
+        with around:
             yield request
             request.check()
         if not partial.is_file():

@@ -8,7 +8,10 @@ from collections.abc import Sequence
 from ...core.errors import SceneError
 from ...core.hemicube import Hemicube
 from ...core.region import Region
+from .planes import MOST_SAMPLED
 
+# The route of a scene whose light comes in by shadow rays (`light_check`): not one to be chosen.
+SAMPLED = "sampled"
 # Cycles and Blender's result each hold a group's pass: 3 floats, twice.
 BYTES_PER_PASS = 24
 OTHER_PASSES = 8
@@ -35,6 +38,11 @@ def render_plan(
 ) -> list[list[tuple[int, str]]]:
     """The (patch, pattern name) images of each render."""
     k = range(len(hemicube))
+    if route == SAMPLED:
+        # every pattern in renders of its own, whose paths are the same: the seed is, and the lights
+        # are where they were
+        some = [k[i : i + MOST_SAMPLED] for i in range(0, len(k), MOST_SAMPLED)]
+        return [[(i, name) for i in part] for name in names for part in some]
     if route == "all":
         return [[(i, name) for i in k for name in names]]
     if route == "pattern":

@@ -22,6 +22,9 @@ FAR = 1000.0
 # Patterns stand behind each other, each this much farther out: so near that a patch point keeps its
 # direction, so far that a ray cannot miss the gap (float32 at 1,000 radii).
 GAP = 1e-4
+# A shadow ray's light group has 8 bits in Cycles: of more than so many, some lose their light and
+# nothing says so.
+MOST_SAMPLED = 255
 
 
 def wanted(scene: bpy.types.Scene, centre: Iterable[float], radius: float) -> Hemicube:
@@ -82,12 +85,16 @@ def _grain(nodes: Nodes) -> Any:
     return nodes.math("GREATER_THAN", noise.outputs["Value"], 0.5)
 
 
-def pattern_material(name: str, patterns: PatternSet, opaque: bool) -> Any:
-    """Emission of a pattern of the set (or of `GRAIN`), plus what lies behind."""
+def pattern_material(name: str, patterns: PatternSet, sampled: bool = False) -> Any:
+    """Emission of a pattern of the set (or of `GRAIN`), plus what lies behind.
+
+    What lies behind the last of them is the background, and that is where Cycles adds the sun lamps
+    of the scene to rays that were scattered: an opaque patch would take away their mirror images.
+    """
     material = bpy.data.materials.new(f"ARTO {name}")
     # paths find the patches; no shadow ray is ever cast at them, so Cycles' limit of 255 light
     # groups for sampled lights does not apply
-    material.cycles.emission_sampling = "NONE"
+    material.cycles.emission_sampling = "FRONT_BACK" if sampled else "NONE"
     tree = material.node_tree
     tree.nodes.clear()
     nodes = Nodes(tree)
@@ -96,11 +103,10 @@ def pattern_material(name: str, patterns: PatternSet, opaque: bool) -> Any:
     else:
         row = patterns.coefficients[patterns.patterns.index(name)]
         radiance = _polynomial(nodes, row)
-    shader = nodes.add("ShaderNodeEmission", (1, 1, 1, 1), radiance).outputs[0]
-    if not opaque:
-        behind = nodes.add("ShaderNodeBsdfTransparent").outputs[0]
-        shader = nodes.add("ShaderNodeAddShader", shader, behind).outputs[0]
-    nodes.add("ShaderNodeOutputMaterial", shader)
+    light = nodes.add("ShaderNodeEmission", (1, 1, 1, 1), radiance).outputs[0]
+    behind = nodes.add("ShaderNodeBsdfTransparent").outputs[0]
+    both = nodes.add("ShaderNodeAddShader", light, behind).outputs[0]
+    nodes.add("ShaderNodeOutputMaterial", both)
     return material
 
 
@@ -125,6 +131,7 @@ def build(
     patterns: PatternSet,
     images: Iterable[tuple[int, str]],
     made: Callable[[Any], Any],
+    sampled: bool = False,
 ) -> None:
     """Fill `collection` with a plane for each (patch, pattern name) of `images`.
 
@@ -133,9 +140,7 @@ def build(
     """
     images = list(images)
     used = list(dict.fromkeys(name for _, name in images))
-    materials = {
-        name: made(pattern_material(name, patterns, opaque=name == used[-1])) for name in used
-    }
+    materials = {name: made(pattern_material(name, patterns, sampled)) for name in used}
     centre = np.array(hemicube.centre)
     for k, pattern in images:
         name = group_name(k, pattern)
@@ -147,11 +152,21 @@ def build(
 
 @contextmanager
 def lit(
-    on: Stage, hemicube: Hemicube, patterns: PatternSet, images: Iterable[tuple[int, str]]
+    on: Stage,
+    hemicube: Hemicube,
+    patterns: PatternSet,
+    images: Iterable[tuple[int, str]],
+    sampled: bool = False,
 ) -> Iterator[None]:
-    """The stage with the planes of these images around it and their light groups to write."""
+    """The stage with the planes of these images around it and their light groups to write.
+
+    sampled: Cycles also casts shadow rays at the patches, as it does at a world; then there may be
+    `MOST_SAMPLED` of them.
+    """
     made: list[Any] = []
     images = list(images)
+    if sampled and len(images) > MOST_SAMPLED:
+        raise ValueError(f"{len(images)} sampled patches; Cycles tells {MOST_SAMPLED} apart")
 
     def note(block: Any) -> Any:
         made.append(block)
@@ -161,7 +176,7 @@ def lit(
     try:
         collection = note(bpy.data.collections.new("ARTO Capture"))
         on.scene.collection.children.link(collection)
-        build(collection, hemicube, patterns, images, note)
+        build(collection, hemicube, patterns, images, note, sampled)
         for k, name in images:
             layer.lightgroups.add(name=group_name(k, name))
         yield

@@ -130,9 +130,9 @@ class Job:
         """How far it is, in words."""
         if self.told:
             return "stopping"
-        text = f"{self.state.text}, {clock(time.monotonic() - self.begun)}"
         left = self.state.left
-        return text + (f", about {clock(left)} left" if left is not None else "")
+        spent = clock(time.monotonic() - self.begun)
+        return f"{self.state.share:.0%}, " + (f"{clock(left)} left" if left is not None else spent)
 
 
 # No window of a console, and the artist's work first.
@@ -237,7 +237,7 @@ def _in_the_middle() -> bool:
 def _show_share(job: Job | None) -> None:
     text = None
     if job:
-        text = f"ARTO is {DOING[job.verb]}: {job.state.share:.0%} {job.line}   (ESC: cancel)"
+        text = f"ARTO is {DOING[job.verb]}: {job.state.text}, {job.line}   (ESC: cancel)"
     for window in bpy.context.window_manager.windows:
         # a timer has no window of its own after a file was opened, and Blender asks for one here
         with bpy.context.temp_override(window=window):

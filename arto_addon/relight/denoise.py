@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...core import exr
 from ...core.field import Field
-from ..blender.output import float_exr
+from ..blender.output import float_exr, write_to
 from ..work import Render, blocking_render
 
 _available: list[bool] = []
@@ -103,12 +103,11 @@ def denoise(
             render.engine = "CYCLES"
             render.resolution_x, render.resolution_y = width, height
             render.resolution_percentage = 100
-            render.use_compositing, render.use_sequencer = True, False
-            render.use_file_extension = False
+            render.use_compositing = True
             render.compositor_device, render.compositor_precision = "CPU", "FULL"
             float_exr(render, multilayer=False)
             path = Path(folder) / "denoised.exr"
-            render.filepath = str(path)
+            write_to(render, path)
             request = Render(studio.name, 0, "denoising")
             blocking_render(request)
             request.check()

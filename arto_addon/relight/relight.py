@@ -15,6 +15,7 @@ from ...core.light import PatchLight
 from ...core.region import Region
 from ...core.relight import over
 from ...core.relight import relight as relight_field
+from ..capture.plan import SAMPLED
 from ..shot import paths
 from ..shot.shot import check_same_shot, layer_of
 from ..shot.status import changed_since
@@ -22,7 +23,7 @@ from ..work import Progress, Steps
 from ..world.background import background
 from ..world.bake import bake
 from ..world.check import check_world
-from ..world.lamp_render import lamp_light
+from ..world.lamp_render import brightness, lamp_light, region_of
 from . import denoise, plate
 
 # From this share of the light on the lamps are the picture, and what the field adds is denoised
@@ -80,7 +81,7 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
         last = now
 
     yield Progress(0.0, "bringing the world to an environment map")
-    environment = bake(scene, settings.environment_width)
+    environment = whole = bake(scene, settings.environment_width)
     lap("world")
     parts: list[NDArray[np.float32]] = []
     lamps, together = "no", False
@@ -103,7 +104,17 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     light = PatchLight(environment, field.hemicube)
     lap("light")
     yield Progress(0.6, "relighting")
-    picture = relight_field(field, light, settings.own_lamps)
+    held = field.about.get("route") == SAMPLED
+    picture = relight_field(field, light, 0.0 if held else settings.own_lamps)
+    if held:
+        # light that only shadow rays bring: how much of it, Cycles lets hang on the whole world
+        region = region_of(field).slices
+        expected = yield from brightness(scene, field, whole, 0.65)
+        for rendered in parts:  # the lamps' light, which is Cycles' already
+            expected = np.maximum(expected - rendered[region].mean(axis=(0, 1)), 0)
+        found = picture[region][..., :3].mean(axis=(0, 1), dtype=np.float64)
+        picture[..., :3] *= np.divide(expected, found, out=np.ones(3), where=found > 0)
+        picture[..., :3] += np.float32(settings.own_lamps) * field.layer("own")
     parts.append(picture[..., :3])
     if together:
         parts = [sum(parts)]

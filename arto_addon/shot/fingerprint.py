@@ -222,4 +222,4 @@ def _shape(evaluated: bpy.types.Object, thing: bpy.types.Object) -> str:
         return f"{settings}:"
     points = np.empty(len(mesh.vertices) * 3, np.float32)
     mesh.vertices.foreach_get("co", points)
-    return f"{settings}:{hashlib.blake2b(points, digest_size=8).hexdigest()}"
+    return f"{settings}:{walk.checksum(points).hex()}"

@@ -167,8 +167,9 @@ def nearest(scene: bpy.types.Scene, view_layer: str | None = None) -> Shot | Non
 def shown(scene: bpy.types.Scene) -> str:
     """The shot's folder for a panel, empty where there is none."""
     try:
-        return str(place(scene, fresh=bpy.app.background).folder)
-    except (ArtoError, OSError):
+        folder = place(scene, fresh=bpy.app.background).folder
+        return bpy.path.relpath(str(folder)) if bpy.data.filepath else str(folder)
+    except (ArtoError, OSError, ValueError):  # on another drive too
         return ""
 
 

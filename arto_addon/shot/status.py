@@ -53,7 +53,7 @@ def is_of_another(scene: bpy.types.Scene, view_layer: str | None = None) -> bool
 
 
 def unfinished(folder: Path) -> list[str]:
-    """The captures in a shot's folder that were stopped, the newest first: `2 of 7 tiles, ...`."""
+    """The captures in a shot's folder that were stopped, the newest first: `2 of 7 tiles`."""
     found = []
     for path in folder.glob("unfinished-*/" + capture_set.HEADER):
         try:
@@ -63,8 +63,7 @@ def unfinished(folder: Path) -> list[str]:
         if there:
             tiles = there.head["tiles"]
             done = sum(bool(t["done"]) for t in tiles)
-            text = f"{done} of {len(tiles)} tiles, {there.head.get('samples')} samples"
-            found.append((path.stat().st_mtime_ns, text))
+            found.append((path.stat().st_mtime_ns, f"{done} of {len(tiles)} tiles"))
     return [text for _, text in sorted(found, reverse=True)]
 
 
@@ -109,6 +108,14 @@ def unfinished_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Li
         return None
     stopped = unfinished(place.source)
     return (f"and unfinished: {'; '.join(stopped)}", False) if stopped else None
+
+
+def caution_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line | None:
+    """What the check of the light found before the capture; None for nothing."""
+    place = _place(scene, view_layer)
+    there = _capture_set(place) if place and not place.owner else None
+    caution = there.head.get("caution") if isinstance(there, CaptureSet) else None
+    return (str(caution["text"]), False) if isinstance(caution, dict) else None
 
 
 def _capture_set(place: Place) -> CaptureSet | Line | None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import bpy
 
-from ..blender.output import float_exr
 from .stage import Stage
 
 
 def prepare(on: Stage, layers: int) -> None:
     """Switch off on the stage whatever would bend the light or take it apart."""
     s = on.scene.arto
+    through = on.scene.cycles.transparent_max_bounces + layers
     for path, value in {
         "cycles.samples": s.samples,
         "cycles.seed": s.seed,
@@ -23,7 +23,9 @@ def prepare(on: Stage, layers: int) -> None:
         "cycles.sample_clamp_direct": 0.0,
         "cycles.sample_clamp_indirect": 0.0,
         "cycles.use_fast_gi": False,
-        "cycles.transparent_max_bounces": on.scene.cycles.transparent_max_bounces + layers,
+        "cycles.transparent_max_bounces": through,
+        # a path that a coin ends between two layers is noise in the farther ones alone
+        "cycles.min_transparent_bounces": through,
         "render.film_transparent": True,
         # glass that lets the film through would let the patches through as well
         "cycles.film_transparent_glass": False,
@@ -37,4 +39,3 @@ def prepare(on: Stage, layers: int) -> None:
     world.node_tree.nodes.clear()
     on.changed["world"] = [on.scene.world.name if on.scene.world else None, None]
     on.scene.world = world
-    float_exr(on.scene.render)

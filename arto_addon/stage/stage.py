@@ -15,6 +15,7 @@ import bpy
 
 from ...core.errors import SceneError
 from ...core.region import Region
+from ..blender.output import float_exr
 
 # What carries light out of a render besides Combined and is of no use here.
 _KEEP_PASSES = {"use_pass_combined", "use_pass_z"}
@@ -54,6 +55,31 @@ class Stage:
         bpy.data.batch_remove([*self._made, self.scene])
 
 
+def _hold_still(out: Stage) -> None:
+    """Take the animation off the scene's settings: they stay as they are at this frame.
+
+    A key or a driver is asked again when the render begins, and would overrule what is set here.
+    The scene's custom properties keep theirs: drivers of objects read them.
+    """
+    animation = out.scene.animation_data
+    if animation is None:
+        return
+    while animation.nla_tracks:
+        animation.nla_tracks.remove(animation.nla_tracks[0])
+    for driver in list(animation.drivers):
+        if not driver.data_path.startswith('["'):
+            animation.drivers.remove(driver)
+    if animation.action is None:
+        return
+    animation.action = out.made(animation.action.copy())
+    for layer in animation.action.layers:
+        for strip in layer.strips:
+            for bag in strip.channelbags:
+                for curve in list(bag.fcurves):
+                    if not curve.data_path.startswith('["'):
+                        bag.fcurves.remove(curve)
+
+
 @contextmanager
 def stage(scene: bpy.types.Scene, view_layer: str) -> Iterator[Stage]:
     """A copy of `scene` with only `view_layer` in use, without compositing and extra passes."""
@@ -62,6 +88,7 @@ def stage(scene: bpy.types.Scene, view_layer: str) -> Iterator[Stage]:
     copy = scene.copy()
     out = Stage(copy)
     try:
+        _hold_still(out)
         copy.frame_set(scene.frame_current, subframe=scene.frame_subframe)
         for layer in list(copy.view_layers):
             if layer.name != view_layer:
@@ -80,12 +107,7 @@ def stage(scene: bpy.types.Scene, view_layer: str) -> Iterator[Stage]:
         while layer.lightgroups:
             layer.lightgroups.remove(layer.lightgroups[0])
         copy.render.use_compositing = False
-        copy.render.use_sequencer = False
-        copy.render.use_multiview = False
-        copy.render.use_overwrite = True
-        copy.render.use_placeholder = False
-        copy.render.use_file_extension = False
-        copy.render.use_freestyle = False
+        float_exr(copy.render)
         yield out
     finally:
         out.clear()

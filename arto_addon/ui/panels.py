@@ -54,6 +54,7 @@ class ARTO_PT_main(_Panel, bpy.types.Panel):
         column.prop(settings, "samples")
         column.operator("arto.capture", icon="RENDER_STILL")
         _line(column, status.capture_line(context.scene))
+        _line(column, status.caution_line(context.scene))
         if stopped := status.unfinished_line(context.scene):
             row = column.row(align=True)
             _line(row, stopped)
@@ -77,7 +78,7 @@ class ARTO_PT_main(_Panel, bpy.types.Panel):
         """What runs, or how the last piece of work ended."""
         if job := session.current:
             column.separator()
-            column.label(text=session.busy())
+            column.label(text=f"{job.state.text[0].upper()}{job.state.text[1:]}")
             row = column.row(align=True)
             row.progress(factor=job.state.share, text=job.line)
             row.operator("arto.cancel", text="", icon="X")

@@ -6,35 +6,35 @@ patch, which is why the field is better off without them.
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core import exr
 from ...core.environment import Environment
 from ...core.errors import SceneError
 from ...core.field import Field
 from ...core.region import Region
 from ..stage.settings import prepare
+from ..stage.small import parts_of, small
 from ..stage.stage import Stage, set_region, stage
-from ..work import Render, Steps
+from ..work import Steps
 
 GROUP = "ARTO_lamps"
 
 
-def _world(on: Stage, lamps: Environment) -> Any:
-    """A world that shows the map of the lamps, in a light group of its own."""
-    height, width = lamps.image.shape[:2]
+def world_of(on: Stage, shown: Environment, group: str = "") -> Any:
+    """A world that shows a map, in a light group of its own where one is named."""
+    height, width = shown.image.shape[:2]
     image = on.made(
         bpy.data.images.new("ARTO Lamps", width, height, alpha=False, float_buffer=True)
     )
     image.colorspace_settings.name = bpy.data.colorspace.working_space
     rgba = np.ones((height, width, 4), np.float32)
-    rgba[..., :3] = lamps.image[::-1]
+    rgba[..., :3] = shown.image[::-1]
     image.pixels.foreach_set(rgba.ravel())
     image.update()
     world = on.made(bpy.data.worlds.new("ARTO Lamps"))
@@ -42,7 +42,7 @@ def _world(on: Stage, lamps: Environment) -> Any:
     texture = nodes.new("ShaderNodeTexEnvironment")
     texture.image = image
     world.node_tree.links.new(texture.outputs["Color"], nodes["Background"].inputs["Color"])
-    world.lightgroup = GROUP
+    world.lightgroup = group
     # left to itself, Cycles takes a second for a map of 4096; twice as fine as the light finds the
     # rims of its texels, which are blended
     world.cycles.sampling_method = "MANUAL"
@@ -68,33 +68,51 @@ def lamp_light(
     """
     region = region_of(field)
     out: NDArray[np.float32] = np.zeros((*field.shape, 3), np.float32)
-    with (
-        stage(scene, field.about["view_layer"]) as on,
-        tempfile.TemporaryDirectory() as folder,
-    ):
+    with _lit_by(scene, field, lamps) as on:
+        on.change("cycles.samples", samples)
+        parts = yield from parts_of(on, "rendering the world's lamps", share)
+        out[region.slices] = _light_in(parts)
+    return out
+
+
+# Samples of the small picture that a field's brightness is held against.
+HELD_SAMPLES = 96
+
+
+def brightness(scene: bpy.types.Scene, field: Field, light: Environment, share: float) -> Steps:
+    """Render, small, what a map brings to the picture of a field -> (3,), its mean radiance.
+
+    Raises SceneError, CancelledError; the scene stays as it is.
+    """
+    with _lit_by(scene, field, light) as on, small(on, HELD_SAMPLES):
+        parts = yield from parts_of(on, "looking how bright the world's light is", share)
+        return _light_in(parts).mean(axis=(0, 1), dtype=np.float64)
+
+
+@contextmanager
+def _lit_by(scene: bpy.types.Scene, field: Field, shown: Environment) -> Iterator[Stage]:
+    """A stage of a field's picture with a map as its world, in the light group `GROUP`."""
+    with stage(scene, field.about["view_layer"]) as on:
         # whatever the artist looks at meanwhile: the field is Cycles'
         on.change("render.engine", "CYCLES")
         prepare(on, layers=0)
-        on.change("cycles.samples", samples)
-        on.scene.world = _world(on, lamps)
+        on.scene.world = world_of(on, shown, GROUP)
         on.scene.view_layers[0].lightgroups.add(name=GROUP)
-        set_region(on.scene, region)
-        path = Path(folder) / "lamps.exr"
-        on.scene.render.filepath = str(path)
-        request = Render(on.scene.name, share, "rendering the world's lamps")
-        yield request
-        request.check()
-        parts = exr.read(path)
-        light = next((p for name, p in parts.items() if name.endswith(GROUP)), None)
-        if light is None:
-            raise SceneError(
-                "Blender wrote no light of the world's lamps: turn Render Lamps off to relight "
-                "without them"
-            )
-        if bad := int((~np.isfinite(light[..., :3])).any(axis=-1).sum()):
-            raise SceneError(
-                f"the light of the world's lamps has {bad} pixels that are infinite or not a "
-                "number: find the material there, or turn Render Lamps off"
-            )
-        out[region.slices] = light[..., :3]
-    return out
+        set_region(on.scene, region_of(field))
+        yield on
+
+
+def _light_in(parts: dict[str, NDArray]) -> NDArray[np.float32]:
+    """The light of the group `GROUP` in a render's parts, (H, W, 3). Raises SceneError."""
+    light = next((p for name, p in parts.items() if name.endswith(GROUP)), None)
+    if light is None:
+        raise SceneError(
+            "Blender wrote no light of the world's lamps: turn Render Lamps off to relight "
+            "without them"
+        )
+    if bad := int((~np.isfinite(light[..., :3])).any(axis=-1).sum()):
+        raise SceneError(
+            f"the light of the world's lamps has {bad} pixels that are infinite or not a "
+            "number: find the material there, or turn Render Lamps off"
+        )
+    return light[..., :3]

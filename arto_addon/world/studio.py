@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core import exr
-from ..blender.output import float_exr
+from ..blender.output import float_exr, write_to
 from ..work import Render, blocking_render
 
 
@@ -39,8 +39,6 @@ def studio_scene(scene: bpy.types.Scene, name: str) -> Iterator[tuple[Any, list[
         studio.cycles.sample_clamp_direct = 0
         studio.cycles.sample_clamp_indirect = 0
         studio.render.use_compositing = False
-        studio.render.use_sequencer = False
-        studio.render.use_file_extension = False
         studio.view_layers[0].use_pass_combined = True
         float_exr(studio.render, multilayer=False)
         yield studio, made
@@ -52,7 +50,7 @@ def render(studio: Any) -> NDArray[np.float32]:
     """Render a studio scene -> (H, W, 4) float32, rows top-down."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "picture.exr"
-        studio.render.filepath = str(path)
+        write_to(studio.render, path)
         request = Render(studio.name, 0, "world")
         blocking_render(request)
         request.check()

@@ -1,8 +1,8 @@
 """The box: an axis-aligned rectangle, uniform inside (paper 3 and 5), from its moments.
 
 A uniform box of centre mu and half width a has E[u] = mu and E[u^2] = mu^2 + a^2 / 3, where its
-patch is so small that area and solid angle are one; `solid_angle` finds the box on any. The paper's
-search finds the same minimum where its patterns can see it.
+patch is so small that area and solid angle are one; `measure.box_of` finds the box on any. The
+paper's search finds the same minimum where its patterns can see it.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..light import PatchLight
+from ..measure import box_of
 from ..moments import Moments
 from ..patterns import ONE, UU, VV, U, V
-from ..solid_angle import fit_boxes
 
 
 class Box:
@@ -23,7 +23,7 @@ class Box:
     needs: tuple[int, ...] = (ONE, U, UU, V, VV)
 
     def fit(self, moments: Moments) -> NDArray:
-        return fit_boxes(moments.mean, moments.variance, moments.extent)
+        return box_of(moments.mean, moments.variance, moments.extent)
 
     def average(self, light: PatchLight, k: int, parameters: NDArray) -> NDArray:
         u0, u1, v0, v1 = parameters.astype(np.float64).T

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..light import PatchLight
+from ..measure import box_averages, box_of
 from ..moments import Moments
 from ..patterns import ONE, UU, UV, VV, U, V
-from ..solid_angle import box_averages, fit_boxes
 
 # Rounds of finding the box and taking its covariance from what the shares are told by.
 _STEPS = 4
@@ -55,7 +55,7 @@ class Double:
                 left = (moments.normalised[square] - (1 - share) * even[square]) / share
                 means.append(mean)
                 variances.append(np.maximum(left - mean * mean, 0))
-            boxes = fit_boxes((means[0], means[1]), (variances[0], variances[1]), moments.extent)
+            boxes = box_of((means[0], means[1]), (variances[0], variances[1]), moments.extent)
             averages = box_averages(boxes, moments.extent)
             own = averages[UV] - averages[U] * averages[V]
         return np.clip(np.concatenate([share[:, None], boxes], axis=-1), 0, 1)

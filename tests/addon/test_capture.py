@@ -184,7 +184,7 @@ def test_another_capture_does_not_go_on_with_it(tmp_path, monkeypatch):
     there = captured(scene)
     assert (there.folder / "tile_0000.exr").stat().st_mtime_ns != old
     # nor is it thrown away: with its settings again, it goes on
-    assert status.unfinished_line(scene) == ("and unfinished: 1 of 2 tiles, 64 samples", False)
+    assert status.unfinished_line(scene) == ("and unfinished: 1 of 2 tiles", False)
     scene.arto.samples -= 1
     there = captured(scene)
     assert (there.folder / "tile_0000.exr").stat().st_mtime_ns == old
@@ -376,3 +376,31 @@ def test_full_disk(tmp_path):
         assert captured(scene).read(0).basis.max() > 0
     finally:
         subprocess.run(["umount", str(small)], check=True)
+
+
+def test_keys_and_drivers_do_not_overrule_the_stage(tmp_path):
+    """Samples, exposure and film that are driven or keyed: the basis images are those of a scene
+    in which they are not; a custom property of the scene still drives what it drives."""
+    scene = small_scene(tmp_path)
+    scene.arto.samples, scene.arto.patterns, scene.arto.grain = 16, "linear", False
+    scene["lift"] = 0.5
+    lifted = scene.objects["Matt"].driver_add("location", 2).driver
+    variable = lifted.variables.new()
+    variable.name, variable.type = "lift", "CONTEXT_PROP"
+    variable.targets[0].context_property = "ACTIVE_SCENE"
+    variable.targets[0].data_path = '["lift"]'
+    lifted.expression = "1 + lift"
+    plain = captured(scene).read(0)
+    scene.driver_add("cycles.samples").driver.expression = "1"
+    scene.driver_add("cycles.seed").driver.expression = "frame"
+    scene.driver_add("render.film_transparent").driver.expression = "0"
+    scene.cycles.sample_clamp_indirect = 1e-3
+    scene.keyframe_insert("cycles.sample_clamp_indirect", frame=1)
+    scene.keyframe_insert('["lift"]', frame=1)
+    scene.frame_set(1)
+    before = snapshot()
+    driven = captured(scene).read(0)
+    np.testing.assert_allclose(driven.basis, plain.basis, atol=1e-5)
+    np.testing.assert_allclose(driven.alpha, plain.alpha, atol=1e-5)
+    assert not differences(before, snapshot())
+    assert len(bpy.data.actions) == 1

@@ -8,6 +8,7 @@ import pytest
 from arto.arto_addon import fit, work
 from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import paths
+from arto.arto_addon.stage import small
 from arto.arto_addon.world import lamp_render as lamps
 from arto.arto_addon.world.bake import bake
 from arto.core import exr
@@ -164,7 +165,7 @@ def test_pixels_that_are_no_number_are_said(shot, monkeypatch):
         return parts
 
     scenes = len(bpy.data.scenes)
-    monkeypatch.setattr(lamps.exr, "read", broken)
+    monkeypatch.setattr(small.exr, "read", broken)
     with pytest.raises(SceneError, match="1 pixels that are infinite or not a number"):
         work.run(relight.relight(shot))
     monkeypatch.undo()

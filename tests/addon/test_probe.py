@@ -45,14 +45,14 @@ def test_going_on_does_not_probe_again(tmp_path):
     for step in steps:
         if isinstance(step, work.Render):
             texts.append(step.text)
-            if len(texts) == 3:
+            if texts.count(step.text) == 1 and step.text.startswith("render 2 of "):
                 break
             work.blocking_render(step)
     steps.close()
-    assert "probing" in texts[0] and "of " in texts[1]
+    assert [t for t in texts if "probing" in t] and [t for t in texts if "looking at" in t]
     again = []
     work.run(capture.capture(scene, scene.view_layers[0].name), again.append)
-    assert not [s for s in again if "probing" in s.text]
+    assert not [s for s in again if "probing" in s.text or "looking at" in s.text]
 
 
 def test_half_sides_cannot_be_refined_and_the_paper_does_not_try(tmp_path):

@@ -38,7 +38,7 @@ def test_lines_follow_the_files(tmp_path):
     folder.rename(stopped)
     head = stopped / "capture.json"
     head.write_text(head.read_text().replace('"done": true', '"done": false'))
-    assert status.capture_line(scene) == ("unfinished, 0 of 1 tiles, 64 samples", False)
+    assert status.capture_line(scene) == ("unfinished, 0 of 1 tiles", False)
     # damaged: the rest of the panel must be drawn
     stopped.rename(folder)
     head, later = folder / "capture.json", time.time_ns()

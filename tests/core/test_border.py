@@ -49,6 +49,28 @@ def test_core_module_is_free_of_blender_and_small(module: Path) -> None:
     assert len(module.read_text().splitlines()) < 400
 
 
+HOUSE = [
+    p
+    for folder in ("arto_addon", "bench", "tools")
+    for p in sorted((CORE.parent / folder).rglob("*.py"))
+]
+
+
+@pytest.mark.parametrize("module", HOUSE, ids=lambda m: str(m.relative_to(CORE.parent)))
+def test_every_module_is_small_and_documented(module: Path) -> None:
+    text = module.read_text()
+    assert len(text.splitlines()) < 400
+    assert ast.get_docstring(ast.parse(text))
+
+
+def test_the_house_is_as_the_architecture_says() -> None:
+    """Every folder of the add-on and every module of the core is named there."""
+    said = (CORE.parent / "docs" / "architecture.md").read_text()
+    rooms = {p.parent.name for p in HOUSE if p.parent.parent.name == "arto_addon"}
+    rooms |= {p.stem for p in CORE.glob("*.py") if p.stem != "__init__"}
+    assert not {room for room in rooms if f"`{room}`" not in said}
+
+
 def in_new_process(code: str) -> str:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

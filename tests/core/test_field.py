@@ -17,6 +17,7 @@ from arto.core.evidence import DROPPED
 from arto.core.field import HEADER, VERSION, Field
 from arto.core.field_writer import FieldWriter, TileWriter
 from arto.core.hemicube import Hemicube
+from arto.core.patterns import pattern_set
 from arto.core.region import Region
 from arto.core.relight import relight
 from arto.core.supports import BOX, LINEAR, NOTHING, WHOLE
@@ -113,7 +114,8 @@ def test_models_side_by_side(tmp_path: Path) -> None:
     assert sum(field.shares().values()) == pytest.approx(1)
     counts = [(codes == c).sum() for c in (1, 2, 3)]
     data = counts[0] * 6 + counts[1] * (6 + 4) + counts[2] * (6 + 8) + 48 + 4 * 4
-    headers = 128 * 8  # .npy, one each
+    data += 12 * 6 + 4 * 12  # the rest of what was dropped, and whose it is
+    headers = 128 * 10  # .npy, one each
     assert field.bytes_per_pixel() * 12 == data + headers
 
 
@@ -390,3 +392,72 @@ def test_a_field_without_tiles_has_no_layers(tmp_path: Path) -> None:
     FieldWriter(tmp_path / "field", CUBE, (2, 2)).close()
     with pytest.raises(FieldError, match="holds no tiles"):
         Field(tmp_path / "field").layer("alpha")
+
+
+def rest_field(folder: Path, coefficients: np.ndarray) -> Field:
+    """A field of one row: (K, n, 3) coefficients through the choice as the fit makes it."""
+    from arto.core.choice import choose
+    from arto.core.evidence import evidence
+
+    cube = Hemicube(patches=1)
+    white = pattern_set("linear")
+    k, n = coefficients.shape[:2]
+    tile = TileWriter(Region(0, 0, n, 1), {"own": np.zeros((1, n, 3)), "alpha": np.ones((1, n))})
+    known = evidence(coefficients, (1, n))
+    uniform = [cube.uniform_moments(i)[[0, 1, 3]] for i in range(k)]
+    for i in range(k):
+        basis = uniform[i][:, None, None] * coefficients[i]
+        codes, parameters = choose("auto", basis, coefficients[i], white, known, i, cube.extent(i))
+        tile.add(codes, coefficients[i], parameters)
+    writer = FieldWriter(folder, cube, (1, n))
+    writer.add(tile)
+    writer.close()
+    return Field(folder)
+
+
+def test_what_is_dropped_is_kept_as_a_rest(tmp_path: Path) -> None:
+    """Under uniform light nothing is lost; under a sun in a dropped patch nothing of the tile."""
+    from arto.core.environment import Environment
+    from arto.core.light import PatchLight
+
+    rng = np.random.default_rng(3)
+    r = rng.uniform(0.5, 1, (6, 40, 3))
+    r[2] *= 4e-4  # under a thousandth of each pixel, and dropped
+    field = rest_field(tmp_path / "f", r)
+    assert (field.tiles[0].codes[2] == 0).all() and field.tiles[0].rest is not None
+    lit = relight(field, PatchLight(Environment.uniform(1.0), field.hemicube), own=0)[0, :, :3]
+    np.testing.assert_allclose(lit, r.sum(axis=0), rtol=2**-11)
+    # a sun that only the dropped patch has
+    sun = np.zeros((64, 128, 3), np.float32)
+    d = field.hemicube.directions(2, np.array(0.4), np.array(0.6))
+    row = int((0.5 - np.arcsin(d[2]) / np.pi) * 64)
+    column = int((0.5 - np.arctan2(d[1], d[0]) / (2 * np.pi)) * 128)
+    sun[row, column] = 1e5
+    light = PatchLight(Environment(sun), field.hemicube)
+    lit = relight(field, light, own=0)[0, :, :3]
+    expected = r[2] * light.whole[2]
+    np.testing.assert_allclose(lit.mean(axis=0), expected.mean(axis=0), rtol=1e-3)
+    np.testing.assert_allclose(lit, expected, rtol=2e-3)  # here no other patch was dropped
+
+
+def test_a_firefly_leaves_the_others_their_precision(tmp_path: Path) -> None:
+    r = np.array([[[1e5, 1e5, 1e5], [1e-3, 2e-3, 3e-3], [1.0, 0.5, 0.25]]])
+    tile = TileWriter(Region(0, 0, 3, 1), {})
+    tile.add(np.full(3, WHOLE.code, np.uint8), r[0], {WHOLE.code: np.empty((3, 0))})
+    writer = FieldWriter(tmp_path / "f", Hemicube(faces=("top",), patches=1), (1, 3))
+    writer.add(tile)
+    writer.close()
+    found = entries_of(Field(tmp_path / "f"), 0)
+    got = np.stack([found[p][0] for p in range(3)])
+    np.testing.assert_allclose(got, r[0], rtol=2**-11 + 1e-6)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_what_is_no_number_is_refused_with_its_place(tmp_path: Path, bad: float) -> None:
+    tile = TileWriter(Region(0, 0, 2, 1), {})
+    good = np.ones((2, 3))
+    tile.add(np.full(2, WHOLE.code, np.uint8), good, {WHOLE.code: np.empty((2, 0))})
+    broken = good.copy()
+    broken[1, 2] = bad
+    with pytest.raises(FieldError, match="patch 1 has coefficients that are infinite"):
+        tile.add(np.full(2, WHOLE.code, np.uint8), broken, {WHOLE.code: np.empty((2, 0))})

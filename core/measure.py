@@ -1,4 +1,4 @@
-"""Solid angle on a patch: what light is averaged by, and what a light path carries.
+"""The measure of light on a patch: solid angle, and not area.
 
 A patch's coordinates u, v are linear on its face, and patterns are polynomials of them; equal areas
 of the face are not equal solid angles. At (x, y) on the face, where the face is [-1, 1]^2 at
@@ -99,7 +99,7 @@ def uniform_moments(extent: Extent) -> NDArray[np.float64]:
     return out
 
 
-def fit_boxes(
+def box_of(
     mean: tuple[NDArray, NDArray], variance: tuple[NDArray, NDArray], extent: Extent
 ) -> NDArray[np.float64]:
     """The boxes, even in solid angle, of these means and variances along u and v -> (n, 4).

@@ -1,0 +1,150 @@
+"""A check of the light itself, before the long render: do the patches light the scene as a world?
+
+One small picture under all patches, and the same picture in a plain white world, twice. Whatever
+keeps the patches' light out that a world's is not kept from, a setting of the scene or a trick in
+its materials, known here or not, shows as a difference.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...core.agreement import Agreement, agreement
+from ...core.environment import Environment, directions, sample_directions
+from ...core.hemicube import Hemicube
+from ...core.patterns import pattern_set
+from ..blender.nodes import trees
+from ..stage.small import parts_of, small
+from ..stage.stage import Stage
+from ..work import Progress, Steps
+from ..world.lamp_render import world_of
+from . import planes
+
+SAMPLES = 48
+# Of the white world's map, which has holes where the hemicube has.
+HEIGHT = 256
+
+
+def check_light(on: Stage, hemicube: Hemicube) -> Steps:
+    """Compare the light of the prepared stage's patches with a white world's.
+
+    -> (whether the patches must be sampled, a warning or None). Light that only shadow rays bring
+    reaches the picture from patches that they are cast at; then that is what is to be done, and the
+    warning says what it costs. A warning is `{"text": ..., "ratio": ..., ...}`, `Agreement`.
+    Raises CancelledError; the stage is left as it was.
+    """
+    seed = on.scene.cycles.seed
+    black, through = on.scene.world, on.scene.cycles.transparent_max_bounces
+    with small(on, SAMPLES):
+        own = _combined((yield from parts_of(on, "looking at the scene's own light")))
+        found = yield from _of_patches(on, hemicube, own, sampled=False)
+        expected = []
+        try:
+            on.scene.world = _white(on, hemicube)
+            # as many clear surfaces as in the artist's render
+            asked = on.changed.get("cycles.transparent_max_bounces", [through])[0]
+            on.scene.cycles.transparent_max_bounces = asked
+            for i in (1, 2):
+                on.scene.cycles.seed = seed + i
+                parts = yield from parts_of(on, "looking at the light of a white world")
+                expected.append(_combined(parts))
+        finally:
+            on.scene.world = black
+            on.scene.cycles.seed = seed
+            on.scene.cycles.transparent_max_bounces = through
+        truth = np.stack(expected)
+        seen = agreement(found, truth, own)
+        sampled, text = False, ""
+        if not seen.agrees and seen.worst < 1:
+            found = yield from _of_patches(on, hemicube, own, sampled=True)
+            again = agreement(found, truth, own)
+            sampled = abs(again.ratio - 1) < abs(seen.ratio - 1)
+            if sampled and again.agrees:
+                text = f"{_cause(on)}: it takes a render for each pattern, in which it is right"
+            seen = again if sampled else seen
+    text = text or _words(on, seen)
+    if not text:
+        return False, None
+    yield Progress(0.0, f"CAUTION: {text}")
+    return sampled, {"text": text, **asdict(seen)}
+
+
+def _of_patches(on: Stage, hemicube: Hemicube, own: np.ndarray, sampled: bool) -> Steps:
+    """The picture in the light of all patches and its own, (H, W, 3)."""
+    total = own
+    images = [(k, "white") for k in range(len(hemicube))]
+    most = planes.MOST_SAMPLED if sampled else len(images)
+    for start in range(0, len(images), most):
+        some = images[start : start + most]
+        with planes.lit(on, hemicube, pattern_set("white"), some, sampled):
+            parts = yield from parts_of(on, "looking at the light of the patches")
+        total = total + (_combined(parts) - own)
+    return total
+
+
+def _combined(parts: dict[str, np.ndarray]) -> np.ndarray:
+    return next(v for n, v in parts.items() if n == "Combined" or n.endswith(".Combined"))[..., :3]
+
+
+def _white(on: Stage, hemicube: Hemicube) -> bpy.types.World:
+    """A white world, black in directions that no patch is in.
+
+    By a map, though it is one colour: a world that Cycles sees to be even is not sampled as a
+    light, and then is no more of a world than the patches are.
+    """
+    azimuth, latitude, _ = sample_directions(HEIGHT, 2 * HEIGHT, 1)
+    there = hemicube.locate(directions(azimuth, latitude))[0] >= 0
+    return world_of(on, Environment(np.repeat(there[..., None], 3, axis=-1).astype(np.float32)))
+
+
+def _words(on: Stage, seen: Agreement) -> str:
+    """What is wrong and why it may be, for an artist; empty where nothing is."""
+    if seen.dark and seen.agrees:
+        return (
+            "no light from outside reaches the picture: every world will look the same. Is the "
+            "scene inside a closed room or a dome? Hide it from the render, or let light in"
+        )
+    if seen.agrees:
+        return ""
+    least = f"{seen.worst:.0%} of a world's light reaches {seen.share:.0%} of the picture"
+    return (
+        f"only {least} in this capture: {_cause(on)}"
+        if seen.worst < 1
+        else (
+            f"{seen.worst:.0%} of a world's light is on {seen.share:.0%} of the picture in this "
+            f"capture: {_cause(on)}"
+        )
+    )
+
+
+def _cause(on: Stage) -> str:
+    """The likeliest cause, by what the scene has."""
+    layer = on.scene.view_layers[0]
+    if layer.material_override:
+        return "the view layer overrides all materials"
+    if getattr(layer, "world_override", None):
+        return "the view layer has a world of its own"
+    for thing in on.scene.objects:
+        if thing.hide_render or thing.type in {"LIGHT", "CAMERA", "EMPTY"}:
+            continue
+        if not thing.visible_shadow:
+            return f"'{thing.name}' throws no shadow, and what a world lights through it is dark"
+        for slot in thing.material_slots:
+            if slot.material and _asks_for_shadow_rays(slot.material):
+                return (
+                    f"the material '{slot.material.name}' lets shadow rays through (Light Path), "
+                    "and only a world's light comes that way"
+                )
+    return "a material or a setting treats a world's light otherwise than light from surfaces"
+
+
+def _asks_for_shadow_rays(material: Any) -> bool:
+    return any(
+        node.bl_idname == "ShaderNodeLightPath" and node.outputs["Is Shadow Ray"].is_linked
+        for tree in trees(material.node_tree, set())
+        for node in tree.nodes
+    )

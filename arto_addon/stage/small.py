@@ -1,0 +1,55 @@
+"""A small and quick render of the stage: for looking at the scene before the long ones."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from numpy.typing import NDArray
+
+from ...core import exr
+from ..blender.output import write_to
+from ..work import Render, Steps
+from .stage import Stage, picture_region, picture_size
+
+# Pixels of a small render: its cost is the same for a picture of any size.
+PIXELS = 1728
+_RENDER = ("resolution_x", "resolution_y", "resolution_percentage", "use_crop_to_border")
+
+
+@contextmanager
+def small(on: Stage, samples: int) -> Iterator[None]:
+    """The stage so small that what is captured, a render region of the artist's, has `PIXELS`."""
+    render, cycles = on.scene.render, on.scene.cycles
+    width, height = picture_size(on.scene)
+    share = math.sqrt(PIXELS / picture_region(on.scene).pixels)
+    were = [(render, name, getattr(render, name)) for name in _RENDER]
+    were.append((cycles, "samples", cycles.samples))
+    try:
+        render.resolution_x = max(8, round(width * share))
+        render.resolution_y = max(8, round(height * share))
+        render.resolution_percentage = 100
+        render.use_crop_to_border = render.use_border
+        cycles.samples = samples
+        yield
+    finally:
+        for owner, name, value in were:
+            setattr(owner, name, value)
+
+
+def parts_of(on: Stage, text: str, share: float = 0.0) -> Steps:
+    """Render the stage as it stands -> its parts by name, `exr.read`. Raises CancelledError.
+
+    share: how far the whole work is.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "small.exr"
+        write_to(on.scene.render, path)
+        request = Render(on.scene.name, share, text)
+        yield request
+        request.check()
+        found: dict[str, NDArray] = exr.read(path)
+        return found

@@ -1,0 +1,145 @@
+"""What an artist's file says of its output changes nothing of what is written for us."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from arto.arto_addon import fit, work
+from arto.arto_addon.blender.output import write_to
+from arto.arto_addon.relight import relight
+from arto.arto_addon.stage.settings import prepare
+from arto.arto_addon.stage.stage import stage
+from arto.arto_addon.world.background import background
+from arto.core import exr
+from scene_tools import HEIGHT, WIDTH, captured, set_colour, small_scene
+
+# Of the render settings, what is rendered and not how it is written; the engine is checked.
+PICTURE = {"engine", "filepath", "resolution_x", "resolution_y", "resolution_percentage"}
+
+
+def staged(scene: Any, path: Any) -> dict[str, np.ndarray]:
+    """A render of the stage, with a light group: its parts by name."""
+    with stage(scene, scene.view_layers[0].name) as on:
+        prepare(on, layers=0)
+        on.change("cycles.samples", 1)
+        on.scene.view_layers[0].lightgroups.add(name="group")
+        write_to(on.scene.render, path)
+        request = work.Render(on.scene.name, 0, "")
+        work.blocking_render(request)
+        request.check()
+    return exr.read(path)
+
+
+def others(owner: Any, prop: Any) -> list[Any]:
+    """The values of a setting that it does not have, a few of them."""
+    now = getattr(owner, prop.identifier)
+    if prop.type == "BOOLEAN":
+        return [not now] if not prop.is_array else []
+    if prop.type == "ENUM":
+        if prop.is_enum_flag:
+            return []
+        return [e.identifier for e in prop.enum_items_static if e.identifier != now]
+    if prop.type in {"INT", "FLOAT"} and not prop.is_array:
+        low, high = prop.soft_min, prop.soft_max
+        return [v for v in (low, high) if v != now and abs(v) < 1e6]
+    return []
+
+
+def tried(scene: Any, owner: Any, skip: set[str], path: Any) -> tuple[list[str], int]:
+    """Every setting of `owner` at its other values, one at a time: where parts differ."""
+    expected = staged(scene, path)
+    wrong, count = [], 0
+    for prop in owner.bl_rna.properties:
+        name = prop.identifier
+        if prop.is_readonly or name in skip:
+            continue
+        before = getattr(owner, name)
+        for value in others(owner, prop):
+            try:
+                setattr(owner, name, value)
+            except TypeError:
+                continue  # not offered beside the others
+            found = staged(scene, path)
+            count += 1
+            if found.keys() != expected.keys():
+                wrong.append(f"{name}={value}: parts")
+            elif any(
+                found[k].shape != expected[k].shape
+                or np.abs(found[k].mean() - expected[k].mean()) > 0.1 * expected[k].mean() + 1e-3
+                for k in expected
+                if "Denoising" not in k
+            ):
+                wrong.append(f"{name}={value}: pixels")
+        setattr(owner, name, before)
+    return wrong, count
+
+
+@pytest.fixture
+def plain(tmp_path):
+    scene = small_scene(tmp_path, lamp=True)
+    # a sun in the view alone: any stamp or dithering over it shows
+    scene.render.film_transparent = False
+    return scene
+
+
+@pytest.mark.parametrize(
+    ("media", "kind"),
+    [("IMAGE", "PNG"), ("MULTI_LAYER_IMAGE", "OPEN_EXR_MULTILAYER"), ("VIDEO", "FFMPEG")],
+)
+def test_image_settings_decide_nothing(plain, tmp_path, media, kind):
+    settings = plain.render.image_settings
+    settings.media_type, settings.file_format = media, kind
+    wrong, count = tried(plain, settings, set(), tmp_path / "picture.exr")
+    assert not wrong
+    assert count > 10
+
+
+def test_render_settings_of_writing_decide_nothing(plain, tmp_path):
+    """All that Blender has, but those which say what is rendered."""
+    render = plain.render
+    skip = PICTURE | {
+        "film_transparent",
+        "use_border",
+        "pixel_aspect_x",
+        "pixel_aspect_y",
+        "use_simplify",
+        "threads",
+        "threads_mode",
+        "bake",
+    }
+    wrong, count = tried(plain, render, skip, tmp_path / "picture.exr")
+    assert not wrong
+    assert count > 60
+
+
+@pytest.mark.parametrize(
+    "name", ["a{b}", "{blend_name}", "}{", "{{x}}", "100%", "%04d %s", "v1.2.#3###", "ü 日本 é"]
+)
+def test_odd_folders_are_just_folders(tmp_path, name):
+    """Whatever is in a folder's name, the plate is the same and stands where it was asked for."""
+    folder = tmp_path / name
+    folder.mkdir()
+    scene = small_scene(folder)
+    scene.arto.samples, scene.arto.patterns, scene.arto.denoise = 4, "linear", True
+    scene.arto.adaptive = True
+    set_colour(scene, (0.5, 0.5, 0.5))
+    captured(scene)
+    work.run(fit.fit(scene))
+    path, _ = work.run(relight.relight(scene))
+    assert path == folder / "relit.exr"
+    assert exr.read(path)[""].shape == (HEIGHT, WIDTH, 4)
+    # nothing beside it that a template would have made
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+
+
+def test_a_stamp_is_not_burnt_into_the_light(tmp_path):
+    scene = small_scene(tmp_path, lamp=True)
+    scene.arto.samples, scene.arto.patterns, scene.arto.grain = 4, "linear", False
+    clean = captured(scene).read(0).own
+    scene.render.use_stamp = True
+    scene.render.stamp_font_size = 8
+    scene.render.stamp_background = (1, 0, 1, 1)
+    np.testing.assert_allclose(captured(scene).read(0).own, clean, atol=1e-5)
+    np.testing.assert_allclose(background(scene), 0.0509, atol=1e-3)
