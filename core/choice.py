@@ -133,8 +133,9 @@ def choose(
     """
     codes = np.full(basis.shape[1], NOTHING, np.uint8)
     if choice == "auto":
-        # most entries are too dark to keep: what they see of their patch is not asked for
-        lit = known.kept(coefficient)
+        # most entries are too dark to keep: what they see of their patch is not asked for, and
+        # their light goes into the pixel's rest
+        lit = known.kept(k, coefficient)
         moments = Moments.from_basis(basis[:, lit], patterns, extent, separate)
         codes[lit] = _smallest(moments, known.hits(k, coefficient)[lit])
     else:

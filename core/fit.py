@@ -39,7 +39,7 @@ def fit_tile(
     images = data.basis.reshape(patches, len(patterns), -1, 3)
     coefficients = patterns.coefficient(np.moveaxis(images, 1, 0))
     shape = (data.region.height, data.region.width)
-    known = evidence(coefficients, shape, samples, data.grain)
+    known = evidence(coefficients, shape, hemicube.solid_angles, samples, data.grain)
     brightest = None
     if choice == choices.STAGE_AND_MATTE:
         brightest = channel_sum(coefficients).argmax(axis=0)

@@ -9,11 +9,11 @@ import pytest
 from arto.core.capture_set import CaptureSet
 from arto.core.choice import BROAD, CHOICES, check, choose
 from arto.core.errors import FieldError, PatternError
-from arto.core.evidence import DROPPED, Evidence, evidence
+from arto.core.evidence import DROPPED, SUN, Evidence, evidence
 from arto.core.fit import fit_tile
 from arto.core.hemicube import Hemicube
 from arto.core.patterns import PatternSet, pattern_set
-from arto.core.supports import BOX, BY_CODE, LINEAR, NOTHING, SUPPORTS, WHOLE
+from arto.core.supports import BOX, BY_CODE, LINEAR, NOTHING, REST, SUPPORTS, WHOLE
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -22,8 +22,9 @@ FLAT = (-1e-6, 1e-6, -1e-6, 1e-6)
 
 
 def known(coefficients: np.ndarray, samples: float | None = None) -> Evidence:
-    """Evidence of a row of pixels, (K, n, 3)."""
-    return evidence(coefficients, (1, coefficients.shape[1]), samples)
+    """Evidence of a row of pixels, (K, n, 3), on patches so large that no sun matters."""
+    patches, pixels = coefficients.shape[:2]
+    return evidence(coefficients, (1, pixels), np.full(patches, 4 * np.pi), samples)
 
 
 def alone(
@@ -132,7 +133,7 @@ def test_grain_counts_the_paths_that_matter() -> None:
     sign = rng.choice([-1.0, 1.0], weights.shape)
     size = weights.sum(axis=1)
     coefficients = np.repeat(size.reshape(2, -1, 1) / 3, 3, axis=-1)
-    found = evidence(coefficients, shape, 1e6, (weights * sign).sum(axis=1))
+    found = evidence(coefficients, shape, np.ones(2), 1e6, (weights * sign).sum(axis=1))
     even, uneven = (found.hits(k, c) for k, c in enumerate(coefficients))
     # windows of 25 pixels scatter; their middle is the truth
     assert np.median(even) == pytest.approx(10, rel=0.1)
@@ -157,6 +158,25 @@ def test_what_is_dropped_stays_under_its_share(planted, seed: int, patches: int)
     assert (dropped + smallest > DROPPED * size.sum(axis=0)).all()
 
 
+@given(seed=st.integers(0, 2**31))
+def test_what_a_sun_could_bring_out_is_kept(seed: int) -> None:
+    """On small patches the share of the pixel's light is not all that counts: a sun of irradiance
+    pi in a patch, beside a sky of 1, makes no dropped entry more than `SUN` of its pixel."""
+    rng = np.random.default_rng(seed)
+    cube = Hemicube(patches=16)
+    r = 10 ** rng.uniform(-7, 0, (len(cube), 5, 3))
+    everything = evidence(r, (1, 5), cube.solid_angles)
+    size, dropped = r.sum(axis=-1), np.ones((len(cube), 5), bool)
+    for k, c in enumerate(r):
+        dropped[k, everything.kept(k, c)] = False
+    under_sun = size * np.pi / cube.solid_angles[:, None]
+    assert (
+        under_sun[dropped] <= SUN * np.broadcast_to(size.sum(axis=0), size.shape)[dropped]
+    ).all()
+    small = np.where(dropped, size, 0).sum(axis=0)
+    assert (small > 0).all() and (small <= DROPPED * size.sum(axis=0)).all()
+
+
 @pytest.mark.parametrize("patterns", ["paper", "linear", "moments_uv"])
 @pytest.mark.parametrize("shape", [(1, 1), (1, 5), (5, 8)])
 def test_what_is_dropped_of_a_tile_stays_under_its_share(
@@ -167,7 +187,7 @@ def test_what_is_dropped_of_a_tile_stays_under_its_share(
         made = scene(Hemicube(patches=2), shape, patterns, seed, unlit=0.9)
         data = CaptureSet(write_scene(tmp_path / f"{seed}", made)).read(0)
         *_, tile = fit_tile(data, made.patterns, made.hemicube, "auto")
-        kept = np.stack(tile.codes) != NOTHING
+        kept = ~np.isin(np.stack(tile.codes), (NOTHING, REST))
         size = made.coefficient.sum(axis=-1).reshape(kept.shape)
         dropped = np.where(kept, 0, size).sum(axis=0)
         assert (dropped <= 1.01 * DROPPED * size.sum(axis=0)).all()
@@ -191,7 +211,8 @@ def test_codes_are_for_good() -> None:
     for code, support in BY_CODE.items():
         assert support.code == code and 0 < code < 256
     assert len(BY_CODE) == len({s.name for s in BY_CODE.values()})
-    assert {WHOLE, LINEAR, BOX} <= set(BY_CODE.values()) and NOTHING not in BY_CODE
+    assert {WHOLE, LINEAR, BOX} <= set(BY_CODE.values())
+    assert (NOTHING, REST) == (0, 255) and not {NOTHING, REST} & set(BY_CODE)
 
 
 def test_a_choice_that_cannot_be() -> None:
