@@ -144,6 +144,14 @@ def _settings(options: argparse.Namespace) -> None:
     print(table(run(options.json, options.part, options.seed, options.only)))
 
 
+def _changes(options: argparse.Namespace) -> None:
+    from arto.arto_addon.stage.settings import page
+
+    if options.page:
+        options.page.write_text(page(), encoding="utf-8")
+    print(page())
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
@@ -223,6 +231,10 @@ def main() -> int:
     c.add_argument("--seed", type=int, default=0, help="which share")
     c.add_argument("--only", nargs="+", help="owners, or owner.setting")
     c.set_defaults(run=_settings)
+
+    c = commands.add_parser("changes", help="what a capture changes, as a page of the docs")
+    c.add_argument("page", type=Path, nargs="?")
+    c.set_defaults(run=_changes)
 
     c = commands.add_parser("patterns", help="what each set of patterns can identify")
     c.set_defaults(run=_patterns)

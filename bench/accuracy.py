@@ -89,7 +89,10 @@ class Shot:
     ) -> None:
         self.name, self.size, self.samples = scene_name, size, samples
         self.lamp_samples = lamp_samples
-        self.folder = captured(scene_name, size, samples).folder.parents[1].resolve()
+        there = captured(scene_name, size, samples)
+        # the root of its shots' folders, and the scene that they are of
+        self.folder = there.folder.parents[3].resolve()
+        self.scene_id = there.head["shot"]["scene_id"]
         scene = self.scene()
         work.run(fit.fit(scene))
         self.fields = {ARTO: Field(paths.field_folder(scene))}
@@ -112,6 +115,7 @@ class Shot:
         """The scene anew, with the folder of its capture."""
         scene = reference.new_scene(self.name, *self.size)
         scene.arto.samples, scene.arto.folder = self.samples, str(self.folder)
+        scene.arto.scene_id = self.scene_id
         if self.lamp_samples is not None:
             scene.arto.lamp_samples = self.lamp_samples
         return scene

@@ -26,7 +26,8 @@ from .region import Region
 
 VERSION = 1
 HEADER = "capture.json"
-GROUP = re.compile(r"(?:^|\.)Combined_ARTO_(\d{4})_(\w+)$")
+# After ARTO there may be a number, where a light group of the artist's has the name without.
+GROUP = re.compile(r"(?:^|\.)Combined_ARTO(?:-\d+)?_(\d{4})_(\w+)$")
 # Layers beside the basis images, by the end of their part's name.
 GUIDES = {"albedo": "Denoising Albedo", "normal": "Denoising Normal", "depth": "Depth"}
 # The pattern that shows the noise: a patch of grains so fine that no reflection resolves them, half

@@ -9,8 +9,7 @@ allocator that Blender puts in malloc's place, and Blender aborts.
 from __future__ import annotations
 
 import mmap
-import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import ExrError
+from .exr_layout import LayoutError
+from .exr_layout import check as check_layout
 from .files import whole
 
-# No name in a header is longer.
-_LONGEST_TEXT = 256
 _ORDER = "RGBAXYZ"  # of channels in an array; others follow
+# How many channels a message names.
+_TOLD = 6
 # What a colour space is called in an EXR header (colorInteropID), by Blender's name for it.
 COLOUR_SPACES = {
     "Linear Rec.709": "lin_rec709_scene",
@@ -37,7 +38,8 @@ def _openexr() -> Any:
     return OpenEXR
 
 
-def _open(path: Path, header_only: bool) -> Any:
+def _parts(path: Path, header_only: bool) -> list[Any]:
+    """The parts of a file as the library has them. Raises ExrError."""
     parts = _check_complete(path)
     try:
         file = _openexr().File(str(path), separate_channels=True, header_only=header_only)
@@ -46,106 +48,99 @@ def _open(path: Path, header_only: bool) -> Any:
     # the library leaves out a part that it cannot decode, with a warning
     if len(file.parts) != parts:
         raise ExrError(f"{path} has a damaged part: make it again")
-    return file
+    return list(file.parts)
 
 
 def _check_complete(path: Path) -> int:
-    """How many parts the file has; ExrError unless every chunk that its own table names is there.
-
-    The library reads what is left of a truncated file and fills the rest; here the light would
-    be wrong without a word. Layout: magic, version, headers, table of chunk offsets, chunks.
-    """
+    """How many parts the file has; ExrError unless all of it is there (`exr_layout`)."""
     if not path.is_file():
         raise ExrError(f"there is no file {path}: it was moved or deleted; make it again")
     try:
         if path.stat().st_size < 8:
             raise ExrError(f"{path} is no EXR file (or an empty one): make it again")
         with path.open("rb") as f, mmap.mmap(f.fileno(), 0, access=mmap.ACCESS_READ) as data:
-            if data[:4] != b"\x76\x2f\x31\x01":
-                raise ExrError(f"{path} is no EXR file (or an empty one): make it again")
-            parts = _complete_parts(data)
+            return check_layout(data)
+    except LayoutError as e:
+        raise ExrError(f"{path} is truncated or damaged, {e}: make it again") from None
     except OSError as e:
         raise ExrError(f"{path} cannot be read ({e}): look at its permissions and disk") from e
-    if not parts:
-        raise ExrError(f"{path} is truncated or damaged: make it again")
-    return parts
-
-
-def _complete_parts(data: mmap.mmap) -> int:
-    """The number of parts of an EXR file's bytes, 0 where some are missing."""
-    multipart = bool(data[5] & 0x10)
-    size, at, parts = len(data), 8, 0
-
-    def past_text(at: int) -> int:
-        """Where a text that begins at `at` is over; past the file's end where it is not."""
-        end = data.find(b"\0", at, at + _LONGEST_TEXT)
-        return end + 1 if end >= 0 else size + 1
-
-    while True:  # headers
-        empty = True
-        while (past := past_text(at)) > at + 1:  # an empty name ends a header
-            empty = False
-            past = past_text(past) + 4  # the attribute's type, and how long it is
-            if past > size:
-                return 0
-            at = past + struct.unpack_from("<I", data, past - 4)[0]
-        at = past
-        parts += not empty
-        if empty or not multipart:
-            break
-    if at + 8 > size:
-        return 0
-    # the table ends where the first chunk begins, which may be named last
-    end = struct.unpack_from("<Q", data, at)[0]
-    while True:
-        if end > size or end < at + 8 or (end - at) % 8:
-            return 0
-        table = np.frombuffer(data[at:end], "<u8")
-        if int(table.min()) == end:
-            break
-        end = int(table.min())
-    leader = 12 if multipart else 8
-    last = int(table.max()) + leader
-    whole = last <= size and last + struct.unpack_from("<I", data, last - 4)[0] <= size
-    return parts if whole else 0
 
 
 def part_names(path: Path) -> list[str]:
-    """The names of the parts of a file, without reading pixels (an unnamed part is '')."""
-    return [str(p.header.get("name", "")) for p in _open(path, header_only=True).parts]
+    """The names of the layers of a file as `parts` has them, without reading pixels."""
+    found = [p.header for p in _parts(path, header_only=True)]
+    return list(_layers(path, [(h, [c.name for c in h["channels"]]) for h in found]))
 
 
 def header(path: Path) -> dict[str, Any]:
     """The header of the first part."""
-    return dict(_open(path, header_only=True).parts[0].header)
+    return dict(_parts(path, header_only=True)[0].header)
 
 
 def read(path: Path) -> dict[str, NDArray]:
-    """All parts of a file by name; see `parts`."""
+    """All layers of a file by name; see `parts`."""
     return dict(parts(path))
 
 
 def parts(path: Path) -> Iterator[tuple[str, NDArray]]:
-    """The parts of a file, one by one: name, and (H, W, C), C as R, G, B(, A), or one channel.
+    """The layers of a file, one by one: name, and (H, W, C), C as R, G, B(, A), or one channel.
 
-    A part's name loses nothing; channel names lose their prefix. Raises ExrError for a file that
-    is missing, truncated, or has parts of odd channels.
+    Each may be a part of its own, or many share a part (as Blender interleaves them): then a
+    layer's name is that of its channels before the last dot. Raises ExrError for a file that is
+    missing, truncated, or has layers of odd channels.
     """
-    for part in _open(path, header_only=False).parts:
-        channels = {str(name).rsplit(".", 1)[-1]: ch.pixels for name, ch in part.channels.items()}
-        order = sorted(channels, key=lambda c: (_ORDER.find(c) if c in _ORDER else len(_ORDER), c))
-        if any(pixels is None for pixels in channels.values()):
-            raise ExrError(f"{path} has no pixels in part '{part.header.get('name')}'")
-        if len(part.channels) == 1:
-            pixels = next(iter(channels.values()))[..., None]
-        elif len(channels) == len(part.channels) and all(len(c) == 1 for c in channels):
-            pixels = np.stack([channels[c] for c in order], axis=-1)
-        else:
+    found = _parts(path, header_only=False)
+    for name, (part, channels) in _layers(path, [(p.header, p.channels) for p in found]).items():
+        # one layer at a time goes from the library's arrays into ours: nothing is there twice
+        planes = [found[part].channels.pop(channel).pixels for channel in channels]
+        if any(pixels is None for pixels in planes):
+            raise ExrError(f"{path} has no pixels in '{name}': make it again")
+        if len({pixels.shape for pixels in planes}) > 1:
             raise ExrError(
-                f"{path} has channels {sorted(map(str, part.channels))}: expected R, G, B "
-                "or one a part; save its layers as parts, or as files of their own"
+                f"{path} has channels of different sizes in '{name}': save it without subsampling"
             )
-        yield str(part.header.get("name", "")), pixels
+        half = all(pixels.dtype == np.float16 for pixels in planes)
+        out = np.empty((*planes[0].shape, len(planes)), np.float16 if half else np.float32)
+        for n in range(len(planes)):
+            out[..., n], planes[n] = planes[n], None
+        yield name, out
+
+
+def _layers(
+    path: Path, parts: list[tuple[dict[str, Any], Iterable[str]]]
+) -> dict[str, tuple[int, list[str]]]:
+    """The layers of a file: of each name the part, and the channels in the order of an array's.
+
+    parts: the header of each and the names of its channels.
+    """
+    out: dict[str, tuple[int, list[str]]] = {}
+    for part, (head, channels) in enumerate(parts):
+        by_prefix: dict[str, list[str]] = {}
+        for channel in channels:
+            by_prefix.setdefault(channel.rpartition(".")[0], []).append(channel)
+        own = str(head.get("name", ""))
+        for prefix, names in by_prefix.items():
+            # a part's own name loses nothing where the part is one layer
+            name = own if own and len(by_prefix) == 1 else prefix or own
+            if own and not name.startswith(own):
+                name = f"{own}.{name}"
+            if name in out:
+                raise ExrError(f"{path} has two layers '{name}': give each a name of its own")
+            last = {channel: channel.rpartition(".")[2] for channel in names}
+            if len(names) > 1 and not all(len(c) == 1 for c in last.values()):
+                more = f" and {len(names) - _TOLD} more" if len(names) > _TOLD else ""
+                raise ExrError(
+                    f"{path} has channels {sorted(names)[:_TOLD]}{more}: expected R, G, B or one "
+                    "a layer; save its layers as parts, or as files of their own"
+                )
+            out[name] = part, sorted(names, key=lambda c: (_place(last[c]), last[c]))
+    return out
+
+
+def _place(channel: str) -> int:
+    """Where a channel stands in an array; small letters are the same colours."""
+    found = _ORDER.find(channel.upper())
+    return found if found >= 0 else len(_ORDER)
 
 
 def write(

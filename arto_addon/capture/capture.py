@@ -22,7 +22,7 @@ from ..blender.output import write_to
 from ..shot import home, paths
 from ..shot.fingerprint import fingerprint, key_of
 from ..shot.shot import shot_of
-from ..stage.bounds import scene_bounds
+from ..stage.bounds import Rendered, rendered
 from ..stage.settings import prepare
 from ..stage.stage import Stage, picture_region, set_region, stage
 from ..work import Progress, Render, Steps
@@ -37,11 +37,12 @@ from .resume import empty, finish, unfinished
 ADAPTIVE_SHARE = 2
 
 
-def geometry(scene: bpy.types.Scene, on: Stage) -> Hemicube:
+def geometry(scene: bpy.types.Scene, seen: Rendered) -> Hemicube:
     """The hemicube to capture with: the artist's, where one was built, else a new one."""
+    bounds = seen.bounds()
     there = planes.built(scene)
     if there is None:
-        return planes.wanted(scene, *scene_bounds(on))
+        return planes.wanted(scene, *bounds)
     hemicube, radius = there
     if planes.wanted(scene, hemicube.centre, radius).to_json() != hemicube.to_json():
         raise SceneError(
@@ -73,7 +74,7 @@ def capture(scene: bpy.types.Scene, view_layer: str) -> Steps:
     SceneError, CaptureSetError, BusyError (another process captures this shot), ExrError,
     CancelledError; the scene stays as it is, but for the ID that its shots are found by.
     """
-    check_scene(scene)
+    check_scene(scene, view_layer)
     # whatever a script has moved is where it should be
     scene.view_layers[view_layer].update()
     claimed = paths.claim(scene, view_layer)
@@ -87,7 +88,9 @@ def _capture(scene: bpy.types.Scene, view_layer: str, claimed: Path) -> Steps:
     region = picture_region(scene)
     found = fingerprint(scene, view_layer, full=True)
     with stage(scene, view_layer) as on:
-        hemicube = geometry(scene, on)
+        seen = rendered(on)
+        seen.check()
+        hemicube = geometry(scene, seen)
         # between renders the paths differ, and grain would not be theirs
         grain = settings.grain and settings.route == "all"
         names = [*patterns.patterns, *([GRAIN] if grain else [])]

@@ -15,9 +15,10 @@ from ...core.capture_set import GRAIN, group_name
 from ...core.hemicube import FACE_NAMES, Hemicube
 from ...core.patterns import PatternSet, pattern_set
 from ..blender.nodes import Nodes
-from ..stage.stage import Stage
+from ..stage.stage import Stage, free_mark
 
 COLLECTION = "ARTO Hemicube"
+PATTERN = "arto_pattern"
 FAR = 1000.0
 # Patterns stand behind each other, each this much farther out: so near that a patch point keeps its
 # direction, so far that a ray cannot miss the gap (float32 at 1,000 radii).
@@ -85,12 +86,26 @@ def _grain(nodes: Nodes) -> Any:
     return nodes.math("GREATER_THAN", noise.outputs["Value"], 0.5)
 
 
-def pattern_material(name: str, patterns: PatternSet, sampled: bool = False) -> Any:
-    """Emission of a pattern of the set (or of `GRAIN`), plus what lies behind.
+def _radiance(nodes: Nodes, name: str, patterns: PatternSet) -> Any:
+    """What a pattern of the set (or `GRAIN`) emits, a socket or a value."""
+    if name == GRAIN:
+        return _grain(nodes)
+    return _polynomial(nodes, patterns.coefficients[patterns.patterns.index(name)])
 
-    What lies behind the last of them is the background, and that is where Cycles adds the sun lamps
+
+def _shader(nodes: Nodes, radiance: Any) -> Any:
+    """Emission, plus what lies behind.
+
+    What lies behind the last pattern is the background, and that is where Cycles adds the sun lamps
     of the scene to rays that were scattered: an opaque patch would take away their mirror images.
     """
+    light = nodes.add("ShaderNodeEmission", (1, 1, 1, 1), radiance).outputs[0]
+    behind = nodes.add("ShaderNodeBsdfTransparent").outputs[0]
+    return nodes.add("ShaderNodeAddShader", light, behind).outputs[0]
+
+
+def pattern_material(name: str, patterns: PatternSet, sampled: bool = False) -> Any:
+    """Emission of a pattern of the set (or of `GRAIN`), plus what lies behind."""
     material = bpy.data.materials.new(f"ARTO {name}")
     # paths find the patches; no shadow ray is ever cast at them, so Cycles' limit of 255 light
     # groups for sampled lights does not apply
@@ -98,15 +113,46 @@ def pattern_material(name: str, patterns: PatternSet, sampled: bool = False) -> 
     tree = material.node_tree
     tree.nodes.clear()
     nodes = Nodes(tree)
-    if name == GRAIN:
-        radiance = _grain(nodes)
-    else:
-        row = patterns.coefficients[patterns.patterns.index(name)]
-        radiance = _polynomial(nodes, row)
-    light = nodes.add("ShaderNodeEmission", (1, 1, 1, 1), radiance).outputs[0]
-    behind = nodes.add("ShaderNodeBsdfTransparent").outputs[0]
-    both = nodes.add("ShaderNodeAddShader", light, behind).outputs[0]
-    nodes.add("ShaderNodeOutputMaterial", both)
+    nodes.add("ShaderNodeOutputMaterial", _shader(nodes, _radiance(nodes, name, patterns)))
+    return material
+
+
+def overriding_material(
+    override: Any, names: list[str], patterns: PatternSet, sampled: bool = False
+) -> Any:
+    """A view layer's material override, on the artist's objects; on a plane, its pattern.
+
+    Blender puts a view layer's material on every object, and no slot is asked. So the one material
+    looks at the object: a plane has the number of its pattern, from 1, as property `PATTERN`.
+    """
+    material = override.copy()
+    material.cycles.emission_sampling = "FRONT_BACK" if sampled else "NONE"  # as above
+    tree = material.node_tree
+    nodes = Nodes(tree)
+    number = tree.nodes.new("ShaderNodeAttribute")
+    number.attribute_type, number.attribute_name = "OBJECT", PATTERN
+    total: Any = 0.0
+    for i, name in enumerate(names, 1):
+        mine = nodes.math("COMPARE", number.outputs["Fac"], float(i), 0.5)
+        total = nodes.math("MULTIPLY_ADD", mine, _radiance(nodes, name, patterns), total)
+    plane = nodes.math("GREATER_THAN", number.outputs["Fac"], 0.5)
+    output = tree.get_output_node("CYCLES") or tree.nodes.new("ShaderNodeOutputMaterial")
+    for socket, pattern in (("Surface", _shader(nodes, total)), ("Volume", None)):
+        links = output.inputs[socket].links
+        if not links and pattern is None:
+            continue
+        mix = tree.nodes.new("ShaderNodeMixShader")
+        tree.links.new(plane, mix.inputs[0])
+        if links:
+            tree.links.new(links[0].from_socket, mix.inputs[1])
+        if pattern:
+            tree.links.new(pattern, mix.inputs[2])
+        tree.links.new(mix.outputs[0], output.inputs[socket])
+    if links := output.inputs["Displacement"].links:
+        others = nodes.math("SUBTRACT", 1.0, plane)
+        scaled = nodes.add("ShaderNodeVectorMath", links[0].from_socket, operation="SCALE")
+        tree.links.new(others, scaled.inputs["Scale"])
+        tree.links.new(scaled.outputs[0], output.inputs["Displacement"])
     return material
 
 
@@ -131,12 +177,13 @@ def build(
     patterns: PatternSet,
     images: Iterable[tuple[int, str]],
     made: Callable[[Any], Any],
+    mark: str = "",
     sampled: bool = False,
 ) -> None:
     """Fill `collection` with a plane for each (patch, pattern name) of `images`.
 
-    Each plane carries the light group `capture_set.group_name`. `made` is told of every new
-    data-block.
+    Each plane carries the light group of its image, by a name with that mark (see
+    `stage.free_mark`), or none without. `made` is told of every new data-block.
     """
     images = list(images)
     used = list(dict.fromkeys(name for _, name in images))
@@ -144,9 +191,11 @@ def build(
     centre = np.array(hemicube.centre)
     for k, pattern in images:
         name = group_name(k, pattern)
+        group = name.replace("ARTO_", mark, 1) if mark else ""
         distance = hemicube.size * (1 + GAP * used.index(pattern))
         plane = _plane(name, centre + distance * hemicube.corners(k), materials[pattern], made)
-        plane.lightgroup = name
+        plane.lightgroup = group
+        plane[PATTERN] = float(used.index(pattern) + 1)
         collection.objects.link(plane)
 
 
@@ -173,14 +222,19 @@ def lit(
         return on.made(block)
 
     layer = on.scene.view_layers[0]
+    override = layer.material_override
     try:
+        if override:
+            names = list(dict.fromkeys(name for _, name in images))
+            layer.material_override = note(overriding_material(override, names, patterns, sampled))
         collection = note(bpy.data.collections.new("ARTO Capture"))
         on.scene.collection.children.link(collection)
-        build(collection, hemicube, patterns, images, note, sampled)
-        for k, name in images:
-            layer.lightgroups.add(name=group_name(k, name))
+        build(collection, hemicube, patterns, images, note, free_mark(), sampled)
+        for plane in collection.objects:
+            layer.lightgroups.add(name=plane.lightgroup)
         yield
     finally:
+        layer.material_override = override
         while layer.lightgroups:
             layer.lightgroups.remove(layer.lightgroups[0])
         on.remove(made)

@@ -20,9 +20,9 @@ from ..shot import paths
 from ..shot.shot import check_same_shot, layer_of
 from ..shot.status import changed_since
 from ..work import Progress, Steps
-from ..world.background import background
+from ..world.background import background, background_with_holes, holds_out
 from ..world.bake import bake
-from ..world.check import check_world
+from ..world.check import check_world, differs_by_rays
 from ..world.lamp_render import brightness, lamp_light, region_of
 from . import denoise, plate
 
@@ -57,8 +57,8 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     Raises SceneError, CaptureSetError (of another shot), ShotError (another's), FieldError,
     EnvironmentMapError, ExrError, CancelledError; nothing of the scene changes.
     """
-    check_world(scene)
     layer = view_layer or layer_of(scene)
+    world = check_world(scene, layer)
     scene.view_layers[layer].update()
     settings = scene.arto
     path = paths.relit_file(scene)
@@ -81,7 +81,9 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
         last = now
 
     yield Progress(0.0, "bringing the world to an environment map")
-    environment = whole = bake(scene, settings.environment_width)
+    if by_rays := differs_by_rays(world):
+        yield Progress(0.0, f"the world is {by_rays}")
+    environment = whole = bake(scene, settings.environment_width, layer)
     lap("world")
     parts: list[NDArray[np.float32]] = []
     lamps, together = "no", False
@@ -136,14 +138,31 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     np.maximum(picture, 0, out=picture)
     if not scene.render.film_transparent:
         yield Progress(0.8, "adding the world behind")
-        behind = np.nonzero(picture[..., 3] < OPAQUE)
-        if len(behind[0]):
-            picture = over(picture, background(scene, Region.around(*behind)))
+        captured = region_of(field)
+        if holds_out(scene, layer):
+            behind = background_with_holes(scene, captured, layer)
+            picture[..., :3] += behind[..., :3]
+            picture[..., 3] = behind[..., 3]
+        else:
+            # outside a render region Cycles leaves a picture empty
+            inside = picture[captured.slices]
+            rows, columns = np.nonzero(inside[..., 3] < OPAQUE)
+            if len(rows):
+                seen = Region.around(rows + captured.y, columns + captured.x)
+                there = background(scene, seen, layer)[captured.slices]
+                picture[captured.slices] = over(inside, there)
         lap("background")
     yield Progress(0.9, f"writing {path}")
-    world = scene.world.name if scene.world else ""
-    about = {"scene": scene.name, "world": world, "denoised": denoised, "lamps": lamps}
-    about |= {"look": settings.look, "changed since capture": "; ".join(changed)}
+    about = {"scene": scene.name, "world": world.name, "denoised": denoised, "lamps": lamps}
+    if scene.render.film_transparent and scene.cycles.film_transparent_glass:
+        glass = "opaque: what is seen through it is in it, whatever Transparent Glass says"
+        about["glass"] = glass
+        yield Progress(0.9, f"glass: {glass}")
+    about |= {
+        "look": settings.look,
+        "world by rays": by_rays,
+        "changed since capture": "; ".join(changed),
+    }
     plate.write(path, picture, {name: text for name, text in about.items() if text})
     lap("write")
     say = f" (denoised: {denoised})" if settings.denoise else ""

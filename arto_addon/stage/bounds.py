@@ -1,10 +1,12 @@
-"""How large the scene is: the bounds of exactly what a render would show.
+"""What the scene renders: how large it is, and what of it ARTO has to know.
 
 Blender tells a render engine, and nobody else, what is rendered: with render visibility, instances,
 linked data and modifiers at their render settings. So a render engine is what asks.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
@@ -15,7 +17,34 @@ from ...core.errors import SceneError
 from ..work import last_properties_kept
 from .stage import Stage
 
-_found: list[tuple[NDArray, NDArray]] = []
+
+@dataclass
+class Rendered:
+    """low, high: the corners (3,) of all that a render shows; catchers: the names of its shadow
+    catchers."""
+
+    low: NDArray[np.float64] = field(default_factory=lambda: np.full(3, np.inf))
+    high: NDArray[np.float64] = field(default_factory=lambda: np.full(3, -np.inf))
+    catchers: list[str] = field(default_factory=list)
+
+    def bounds(self) -> tuple[tuple[float, float, float], float]:
+        """Centre and radius. Raises SceneError where there is nothing to see."""
+        if not np.isfinite(self.low).all():
+            raise SceneError("the scene shows nothing: unhide what should be captured")
+        centre = (self.low + self.high) / 2
+        radius = float(np.linalg.norm(self.high - self.low)) / 2
+        return tuple(float(x) for x in centre), max(radius, 1e-6)
+
+    def check(self) -> None:
+        """Raise SceneError where something is rendered that cannot be captured."""
+        if self.catchers:
+            raise SceneError(
+                f"'{self.catchers[0]}' is a shadow catcher, which writes no light groups: turn "
+                "Shadow Catcher off (Object properties, Visibility) and capture it as an object"
+            )
+
+
+_found: list[Rendered] = []
 
 
 def _local_corners(data: bpy.types.Object) -> list[Vector] | None:
@@ -48,22 +77,27 @@ class _BoundsEngine(bpy.types.RenderEngine):
     bl_use_preview = False
 
     def render(self, depsgraph: bpy.types.Depsgraph) -> None:
-        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        seen = Rendered()
         for instance in depsgraph.object_instances:
             if not (instance.show_self or instance.show_particles):
                 continue
             corners = _local_corners(instance.object)
             if corners is None:
                 continue
+            # what is made of a catcher is one
+            if instance.object.is_shadow_catcher or (
+                instance.parent and instance.parent.is_shadow_catcher
+            ):
+                seen.catchers.append(instance.object.name)
             world = np.array([instance.matrix_world @ c for c in corners])
             if np.isfinite(world).all():
-                low, high = np.minimum(low, world.min(axis=0)), np.maximum(high, world.max(axis=0))
-        _found.append((low, high))
+                seen.low = np.minimum(seen.low, world.min(axis=0))
+                seen.high = np.maximum(seen.high, world.max(axis=0))
+        _found.append(seen)
 
 
-def scene_bounds(stage: Stage) -> tuple[tuple[float, float, float], float]:
-    """Centre and radius of what the stage's scene renders; without the hemicube, which is not on
-    the stage yet. Raises SceneError where there is nothing to see."""
+def rendered(stage: Stage) -> Rendered:
+    """What the stage's scene renders; without the hemicube, which is not on the stage yet."""
     scene = stage.scene
     render = scene.render
     settings = {
@@ -85,8 +119,12 @@ def scene_bounds(stage: Stage) -> tuple[tuple[float, float, float], float]:
             setattr(render, name, value)
     finally:
         bpy.utils.unregister_class(_BoundsEngine)
-    if not _found or not np.isfinite(_found[-1][0]).all():
-        raise SceneError("the scene shows nothing: unhide what should be captured")
-    low, high = _found[-1]
-    centre = (low + high) / 2
-    return tuple(float(x) for x in centre), max(float(np.linalg.norm(high - low)) / 2, 1e-6)
+    if not _found:
+        raise SceneError("Blender rendered nothing: look for errors in its console")
+    return _found[-1]
+
+
+def scene_bounds(stage: Stage) -> tuple[tuple[float, float, float], float]:
+    """Centre and radius of what the stage's scene renders. Raises SceneError where there is nothing
+    to see."""
+    return rendered(stage).bounds()

@@ -1,37 +1,72 @@
-"""What is switched off on the stage: whatever bends the light, or takes a picture apart."""
+"""What is switched off on the stage: whatever bends the light, or takes a picture apart.
+
+All of it happens to the stage, a copy of the scene. The page docs/capture-changes.md is made of
+this table, and the panel says where an artist's own setting makes a render look otherwise.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
 
 import bpy
 
 from .stage import Stage
 
 
+@dataclass(frozen=True)
+class Change:
+    """setting: by its path from the scene; to: its value while capturing, or that in words; why;
+    look: for the panel, where the artist's own value makes a render look otherwise, `{}` being it.
+    """
+
+    setting: str
+    to: Any
+    why: str
+    look: str = ""
+
+
+# In words: it hangs on the capture's settings.
+SAMPLES, SEED, THROUGH = "the capture's samples", "the capture's seed", "as before, and the patches"
+CHANGES = (
+    Change("cycles.samples", SAMPLES, "its noise is the main error of the relit picture"),
+    Change("cycles.seed", SEED, "all patterns share their paths"),
+    Change("cycles.use_animated_seed", False, "the same capture is the same again"),
+    Change("cycles.use_layer_samples", "IGNORE", "the capture's samples count"),
+    Change("cycles.use_sample_subset", False, "the capture's samples count"),
+    Change("cycles.time_limit", 0.0, "every pixel has the same samples"),
+    Change("cycles.use_adaptive_sampling", False, "every pixel has the same samples"),
+    Change("cycles.use_denoising", False, "light adds up; the relit picture is denoised"),
+    Change(
+        "cycles.sample_clamp_direct", 0.0, "a sum of clamped lights is not the clamped sum",
+        "Your render clamps direct light at {}; the relit picture does not",
+    ),
+    Change(
+        "cycles.sample_clamp_indirect", 0.0, "a sum of clamped lights is not the clamped sum",
+        "Your render clamps at {}; the relit picture does not",
+    ),
+    Change(
+        "cycles.use_fast_gi", False, "it puts the world's light in the place of bounces",
+        "Your render uses Fast GI; the relit picture has all its bounces",
+    ),
+    Change("cycles.transparent_max_bounces", THROUGH, "a path crosses every pattern"),
+    Change("cycles.min_transparent_bounces", THROUGH, "none ends by a coin between two patterns"),
+    Change("render.film_transparent", True, "alpha is needed; the world behind is added after"),
+    Change(
+        "cycles.film_transparent_glass", False, "it would let the patches through as well",
+        "Your render shows the film through glass; the relit picture shows the world",
+    ),
+    Change("render.use_persistent_data", False, "a copy of a scene has none"),
+)  # fmt: skip
+
+
 def prepare(on: Stage, layers: int) -> None:
     """Switch off on the stage whatever would bend the light or take it apart."""
     s = on.scene.arto
     through = on.scene.cycles.transparent_max_bounces + layers
-    for path, value in {
-        "cycles.samples": s.samples,
-        "cycles.seed": s.seed,
-        "cycles.use_animated_seed": False,
-        "cycles.use_layer_samples": "IGNORE",
-        "cycles.use_sample_subset": False,
-        "cycles.time_limit": 0.0,
-        "cycles.use_adaptive_sampling": False,
-        "cycles.use_denoising": False,
-        "cycles.sample_clamp_direct": 0.0,
-        "cycles.sample_clamp_indirect": 0.0,
-        "cycles.use_fast_gi": False,
-        "cycles.transparent_max_bounces": through,
-        # a path that a coin ends between two layers is noise in the farther ones alone
-        "cycles.min_transparent_bounces": through,
-        "render.film_transparent": True,
-        # glass that lets the film through would let the patches through as well
-        "cycles.film_transparent_glass": False,
-        "render.use_persistent_data": False,
-    }.items():
-        on.change(path, value)
+    words = {SAMPLES: s.samples, SEED: s.seed, THROUGH: through}
+    for change in CHANGES:
+        on.change(change.setting, words.get(change.to, change.to))
     layer = on.scene.view_layers[0]
     layer.cycles.denoising_store_passes = True
     layer.use_pass_z = True
@@ -39,3 +74,43 @@ def prepare(on: Stage, layers: int) -> None:
     world.node_tree.nodes.clear()
     on.changed["world"] = [on.scene.world.name if on.scene.world else None, None]
     on.scene.world = world
+    layer.world_override = None
+
+
+def looks_otherwise(scene: bpy.types.Scene) -> list[str]:
+    """Where a render of the artist's looks otherwise than the relit picture, by his settings."""
+    found = []
+    for change in CHANGES:
+        value = scene.path_resolve(change.setting)
+        if change.look and value != change.to:
+            found.append(change.look.format(f"{value:g}" if isinstance(value, float) else value))
+    return found
+
+
+def page() -> str:
+    """The table as a page of the docs."""
+    rows = [f"| `{c.setting}` | {c.to} | {c.why} |" for c in CHANGES]
+    looks = [f"- `{c.setting}`: {c.look.replace('{}', 'its value')}." for c in CHANGES if c.look]
+    return "\n".join(
+        [
+            "# What a capture changes, and why",
+            "",
+            "A capture happens on a copy of the scene, which is thrown away: yours stays as it",
+            "is. On the copy these are set; `capture.json` says what they were. Output settings",
+            "are set as well: a 32-bit float EXR, with nothing laid over the picture. The world is black.",
+            "Light groups, AOVs and passes are the capture's own.",
+            "",
+            "| setting | while capturing | why |",
+            "|---|---|---|",
+            *rows,
+            "",
+            "The render of the world's lamps is an ordinary render: it keeps your clamps.",
+            "",
+            "## Where the relit picture looks otherwise than your render",
+            "",
+            *looks,
+            "",
+            "(Made by `python -m bench changes docs/capture-changes.md`.)",
+            "",
+        ]
+    )

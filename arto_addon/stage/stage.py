@@ -7,6 +7,7 @@ copy is thrown away on every way out. There is nothing to put back.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -78,6 +79,15 @@ def _hold_still(out: Stage) -> None:
                 for curve in list(bag.fcurves):
                     if not curve.data_path.startswith('["'):
                         bag.fcurves.remove(curve)
+
+
+def free_mark() -> str:
+    """What the names of our light groups begin with: `ARTO_`, or with a number after ARTO where a
+    group of the artist's begins so. What is in a group of the artist's is in none on the stage, and
+    must not come into one of ours."""
+    taken = {block.lightgroup for kind in (bpy.data.objects, bpy.data.worlds) for block in kind}
+    marks = itertools.chain(["ARTO_"], (f"ARTO-{i}_" for i in itertools.count(2)))
+    return next(m for m in marks if not any(group.startswith(m) for group in taken))
 
 
 @contextmanager

@@ -21,7 +21,7 @@ from ..shot.shot import layer_of
 from ..stage.bounds import scene_bounds
 from ..stage.stage import stage
 from ..work import Steps
-from ..world.check import check_world
+from ..world.check import check_world, world_of
 from .long_work import LongWork
 
 
@@ -143,7 +143,7 @@ class ARTO_OT_relight(LongWork):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if context.scene.world is None:
+        if world_of(context.scene) is None:
             cls.poll_message_set("The scene has no world to relight with: add one with an HDRI")
             return False
         return _free(cls) and _there(cls, context, "field", FIELD_HEADER, "Fit the capture first")

@@ -9,6 +9,7 @@ from ..capture import planes
 from ..job import session
 from ..shot import paths, status
 from ..shot.status import Line
+from ..stage.settings import looks_otherwise
 from . import properties
 
 
@@ -72,6 +73,8 @@ class ARTO_PT_main(_Panel, bpy.types.Panel):
         _settings(sub, settings, "lamp_samples")
         _settings(column, settings, "denoise", "look")
         column.operator("arto.relight", icon="WORLD")
+        for text in looks_otherwise(context.scene):
+            column.label(text=text, icon="INFO")
         self._work(column)
 
     def _work(self, column: bpy.types.UILayout) -> None:

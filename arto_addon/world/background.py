@@ -2,44 +2,125 @@
 
 from __future__ import annotations
 
+import tempfile
+from pathlib import Path
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core import exr
 from ...core.region import Region
-from ..stage.stage import picture_size, set_region
+from ..blender.nodes import trees
+from ..blender.output import float_exr, write_to
+from ..shot.shot import layer_of
+from ..stage.settings import prepare
+from ..stage.stage import Stage, free_mark, picture_size, set_region, stage
+from ..work import Render, blocking_render
 from .check import check_world
-from .studio import render as render_studio
-from .studio import studio_scene
 
 # Of the world that is seen behind everything, and the noise at which a pixel has enough.
 BACKGROUND_SAMPLES = 64
 BACKGROUND_NOISE = 0.002
 
 
-def background(scene: bpy.types.Scene, region: Region | None = None) -> NDArray[np.float32]:
+def _set(on: Stage, world: bpy.types.World, region: Region) -> None:
+    """The stage with the world on it, and samples for nothing but the world."""
+    prepare(on, layers=0)
+    # whatever the artist looks at meanwhile: the field is Cycles'
+    on.scene.render.engine = "CYCLES"
+    on.scene.render.film_transparent = False
+    cycles, layer = on.scene.cycles, on.scene.view_layers[0]
+    layer.use_pass_z = layer.cycles.denoising_store_passes = False
+    on.scene.world = on.made(world.copy())
+    # nothing is lit here, so no map of where the light comes from is needed
+    on.scene.world.cycles.sampling_method = "NONE"
+    cycles.samples = BACKGROUND_SAMPLES
+    cycles.use_adaptive_sampling = True
+    cycles.adaptive_threshold = BACKGROUND_NOISE
+    cycles.adaptive_min_samples = 8
+    set_region(on.scene, region)
+
+
+def _render(on: Stage) -> dict[str, NDArray]:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "behind.exr"
+        write_to(on.scene.render, path)
+        request = Render(on.scene.name, 0, "world")
+        blocking_render(request)
+        request.check()
+        return exr.read(path)
+
+
+def background(
+    scene: bpy.types.Scene, region: Region | None = None, view_layer: str | None = None
+) -> NDArray[np.float32]:
     """The world as the artist's camera sees it behind everything -> (H, W, 3).
 
-    region: all that is looked at, 0 outside (default: everything). Pixels get as many samples as
-    they need, up to `BACKGROUND_SAMPLES`: next to none in an even sky, all on the rim of a sun.
+    It is rendered from a copy of the scene with nothing in it: lens, motion blur, film and whatever
+    else the scene has are the scene's. region: all that is looked at, 0 outside (default:
+    everything). Pixels get as many samples as they need, up to `BACKGROUND_SAMPLES`: next to none
+    in an even sky, all on the rim of a sun.
     """
-    check_world(scene)
-    with studio_scene(scene, "ARTO Background") as (studio, _):
-        studio.camera = scene.camera
-        width, height = picture_size(scene)
-        render = studio.render
-        render.resolution_x, render.resolution_y = width, height
-        render.pixel_aspect_x = scene.render.pixel_aspect_x
-        render.pixel_aspect_y = scene.render.pixel_aspect_y
-        studio.cycles.pixel_filter_type = scene.cycles.pixel_filter_type
-        studio.cycles.filter_width = scene.cycles.filter_width
-        studio.cycles.film_exposure = scene.cycles.film_exposure
-        studio.cycles.samples = BACKGROUND_SAMPLES
-        studio.cycles.use_adaptive_sampling = True
-        studio.cycles.adaptive_threshold = BACKGROUND_NOISE
-        studio.cycles.adaptive_min_samples = 8
-        region = region or Region(0, 0, width, height)
-        set_region(studio, region)
-        out = np.zeros((height, width, 3), np.float32)
-        out[region.slices] = render_studio(studio)[..., :3]
-        return out
+    layer = view_layer or layer_of(scene)
+    world = check_world(scene, layer)
+    width, height = picture_size(scene)
+    region = region or Region(0, 0, width, height)
+    out = np.zeros((height, width, 3), np.float32)
+    with stage(scene, layer) as on:
+        _set(on, world, region)
+        float_exr(on.scene.render, multilayer=False)
+        root = on.scene.collection
+        for child in list(root.children):
+            root.children.unlink(child)
+        for thing in list(root.objects):
+            root.objects.unlink(thing)
+        out[region.slices] = next(iter(_render(on).values()))[..., :3]
+    return out
+
+
+def holds_out(scene: bpy.types.Scene, view_layer: str) -> bool:
+    """Whether anything may cut a hole into the picture that the world is not seen through."""
+    todo = [scene.view_layers[view_layer].layer_collection]
+    while todo:
+        collection = todo.pop()
+        if collection.holdout:
+            return True
+        todo += collection.children
+    # in the file, if not in this scene: a render more than is needed does no harm
+    return any(o.is_holdout for o in bpy.data.objects) or any(
+        node.bl_idname == "ShaderNodeHoldout"
+        for material in bpy.data.materials
+        for tree in trees(material.node_tree, set())
+        for node in tree.nodes
+    )
+
+
+def background_with_holes(
+    scene: bpy.types.Scene, region: Region, view_layer: str
+) -> NDArray[np.float32]:
+    """What of the world is seen between the scene's things, and where it is opaque -> (H, W, 4).
+
+    For a scene that holds out: premultiplied by what is not in front of the world, to be added to a
+    plate; alpha is 0 in the holes, and outside the region.
+    """
+    world = check_world(scene, view_layer)
+    width, height = picture_size(scene)
+    out = np.zeros((height, width, 4), np.float32)
+    with stage(scene, view_layer) as on:
+        _set(on, world, region)
+        # a world for the camera alone, in a light group of its own: what else is lit is no matter
+        rays = on.scene.world.cycles_visibility
+        for prop in rays.bl_rna.properties:
+            if prop.type == "BOOLEAN" and not prop.is_readonly and prop.identifier != "camera":
+                setattr(rays, prop.identifier, False)
+        group = free_mark() + "behind"
+        on.scene.world.lightgroup = group
+        on.scene.view_layers[0].lightgroups.add(name=group)
+        on.scene.cycles.max_bounces = 0
+        on.scene.cycles.use_adaptive_sampling = False  # it would look at what is lit
+        parts = _render(on)
+    light = next(pixels for name, pixels in parts.items() if name.endswith(group))
+    whole = next(pixels for name, pixels in parts.items() if name.endswith("Combined"))
+    out[region.slices] = np.dstack([light[..., :3], whole[..., 3:]])
+    return out

@@ -16,18 +16,25 @@ from numpy.typing import NDArray
 
 from ...core.environment import Environment
 from ...core.region import Region
-from ..blender.nodes import trees
+from ..blender.nodes import Nodes, trees
 from ..stage.stage import set_region
 from .check import check_world
+from .detail import detail
 from .studio import render as render_studio
 from .studio import studio_scene
 
+# The least samples of a texel; a world that is finer than the map gets as many as it is finer.
 SAMPLES = 4
 # A texel that carries more than this share of all the light is a sun or a lamp: its edge is
-# rendered again, with this many samples.
+# rendered again, this many times as fine as the world (which leaves 0.3% of the light of a lamp of
+# two of the world's texels), or as its part of these samples allows.
 HOT = 1e-3
-HOT_SAMPLES = 256
-BLOCK = 64
+FINER = 20
+HOT_SAMPLES = 2**23
+# Cycles' samples lie too near to a texel's middle, by 1 / n: no lamp is left with fewer.
+LEAST_HOT = 256
+BLOCK = 32
+LEAST_WIDTH = 1024
 
 
 def _pass_through(made: list[Any], studio: Any) -> None:
@@ -66,32 +73,79 @@ def sees_the_camera(world: Any) -> bool:
     )
 
 
+def _by_area(world: Any) -> None:
+    """Have a world shine by the cosine of the latitude, which is what a direction of an
+    equirectangular map counts for: within a texel with a lamp in it, too, and beside a pole above
+    all. (An even texel needs none of it, and would get the noise of it.)"""
+    tree = world.node_tree
+    out = tree.get_output_node("CYCLES") if tree else None
+    if out is None or not out.inputs["Surface"].is_linked:
+        return
+    nodes = Nodes(tree)
+    direction = tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"]
+    split = nodes.add("ShaderNodeSeparateXYZ", direction)
+    x, y = split.outputs[0], split.outputs[1]
+    # not from 1 - z^2, of which nothing is left beside a pole
+    square = nodes.math("MULTIPLY_ADD", x, x, nodes.math("MULTIPLY", y, y))
+    cosine = nodes.math("SQRT", square)
+    mix = tree.nodes.new("ShaderNodeMixShader")
+    tree.links.new(cosine, mix.inputs[0])
+    tree.links.new(out.inputs["Surface"].links[0].from_socket, mix.inputs[2])
+    tree.links.new(mix.outputs[0], out.inputs["Surface"])
+
+
+def _runs(these: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Begin and end of each run of True."""
+    edges = np.flatnonzero(np.diff(np.pad(these.astype(np.int8), 1)))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
 def _hot_blocks(image: NDArray[np.float32]) -> list[Region]:
-    """Rectangles around the texels that carry much of the light."""
-    energy = image.max(axis=-1) * Environment(image).row_solid_angles[:, None]
-    hot = np.pad(energy > HOT * energy.sum(), 1)
-    hot = sum(
-        hot[1 + dy : hot.shape[0] - 1 + dy, 1 + dx : hot.shape[1] - 1 + dx]
-        for dy in (-1, 0, 1)
-        for dx in (-1, 0, 1)
-    ).astype(bool)
+    """Rectangles around the texels that carry much of the light, and their neighbours, across the
+    map's seam as well."""
+    environment = Environment(image)
+    # as bright as is hot on the equator: a lamp on a pole is in a whole row of texels
+    solid_angle = environment.row_solid_angles.max()
+    hot = image.max(axis=-1) * solid_angle > HOT * environment.irradiance().max()
+    hot = np.pad(hot, ((1, 1), (0, 0)))
+    hot = hot | np.roll(hot, 1, axis=1) | np.roll(hot, -1, axis=1)
+    hot = hot[:-2] | hot[1:-1] | hot[2:]
     found = []
     for y in range(0, hot.shape[0], BLOCK):
         for x in range(0, hot.shape[1], BLOCK):
-            rows, columns = np.nonzero(hot[y : y + BLOCK, x : x + BLOCK])
-            if len(rows):
-                found.append(Region.around(rows + y, columns + x))
+            block = hot[y : y + BLOCK, x : x + BLOCK]
+            for top, bottom in _runs(block.any(axis=1)):
+                found += [
+                    Region(x + left, y + top, right - left, bottom - top)
+                    for left, right in _runs(block[top:bottom].any(axis=0))
+                ]
     return found
 
 
-def bake(scene: bpy.types.Scene, width: int) -> Environment:
-    """The world's light as an equirectangular map, width x width/2, in the working space.
+def _power_of_two(samples: float) -> int:
+    """The nearest number of samples of which Cycles' sequence is even."""
+    return 2 ** round(math.log2(max(SAMPLES, samples)))
 
-    Every texel is the mean over itself. Raises SceneError for a world that is not there or lacks
-    an image.
+
+def _coarser(environment: Environment, scale: int) -> Environment:
+    """A map of so many times fewer texels a side, each the mean over its solid angle."""
+    height, width = environment.image.shape[:2]
+    weights = environment.row_solid_angles.reshape(-1, scale)
+    blocks = environment.image.reshape(height // scale, scale, width // scale, scale, 3)
+    rows = np.einsum("hs,hswtc->hwc", weights / weights.sum(axis=1, keepdims=True), blocks)
+    return Environment((rows / scale).astype(np.float32))
+
+
+def bake(scene: bpy.types.Scene, width: int, view_layer: str | None = None) -> Environment:
+    """The light of a view layer's world as an equirectangular map, width x width/2, in the working
+    space.
+
+    Every texel is the mean over itself, of as many samples as the world's own detail asks for: a
+    disc of a tenth of a degree keeps its light to 1%. Raises SceneError for a world that is not
+    there or lacks an image.
     """
-    check_world(scene)
-    with studio_scene(scene, "ARTO World") as (studio, made):
+    world = check_world(scene, view_layer)
+    with studio_scene(scene, world, "ARTO World") as (studio, made):
         lens = bpy.data.cameras.new("ARTO Panorama")
         camera = bpy.data.objects.new("ARTO Panorama", lens)
         made += [camera, lens]
@@ -102,15 +156,38 @@ def bake(scene: bpy.types.Scene, width: int) -> Environment:
         # the middle of the picture looks along +X, as the middle of a world texture does
         camera.rotation_euler = (math.pi / 2, 0, -math.pi / 2)
         lens.clip_start = 1e-3
-        if sees_the_camera(scene.world):
+        if sees_the_camera(world):
             _pass_through(made, studio)
+            rays = studio.world.cycles_visibility
+            # what is hidden from some rays lights by others; these are those of the box
+            rays.transmission = rays.diffuse or rays.glossy or rays.transmission or rays.scatter
+        finest = detail(world)
+        # a lamp is looked for in small texels, and a coarse map gets their means
+        scale = math.ceil(min(finest, LEAST_WIDTH) / width)
+        width, height = scale * width, scale * (width // 2)
         render = studio.render
-        render.resolution_x, render.resolution_y = width, width // 2
+        render.resolution_x, render.resolution_y = width, height
+        # the world's images are read once for all blocks
+        render.use_persistent_data = True
         studio.cycles.pixel_filter_type = "BOX"
-        studio.cycles.samples = SAMPLES
+        fineness = finest / width
+        studio.cycles.samples = _power_of_two(fineness**2)
         image = np.ascontiguousarray(render_studio(studio)[..., :3])
-        studio.cycles.samples = HOT_SAMPLES
-        for block in _hot_blocks(image):
+        blocks = _hot_blocks(image)
+        _by_area(studio.world)
+        edges = np.sin(np.linspace(np.pi / 2, -np.pi / 2, height + 1))
+        cosine = ((edges[:-1] - edges[1:]) / (np.pi / height)).astype(np.float32)[:, None, None]
+        # half of the samples to all alike (a rim has found little light as yet), half by light
+        energy = image.max(axis=-1) * Environment(image).row_solid_angles[:, None]
+        light = [float(energy[b.slices].sum()) for b in blocks]
+        for block, amount in zip(blocks, light, strict=True):
+            part = (1 / len(blocks) + amount / sum(light)) / 2
+            room = HOT_SAMPLES * part / block.pixels
+            finer = min((FINER * max(fineness, 1)) ** 2, room)
+            studio.cycles.samples = max(LEAST_HOT, _power_of_two(finer))
             set_region(studio, block)
-            image[block.slices] = render_studio(studio)[..., :3]
-    return Environment(image)
+            rows, _ = block.slices
+            image[block.slices] = render_studio(studio)[..., :3] / cosine[rows]
+        # which lets go of them
+        render.use_persistent_data = False
+    return _coarser(Environment(image), scale)

@@ -8,11 +8,20 @@ import bpy
 
 from ...core.errors import SceneError
 from ..blender.nodes import trees
+from ..shot.shot import layer_of
 
 
-def check_world(scene: bpy.types.Scene) -> None:
-    """Raise SceneError for a scene without a world, or one whose images are missing."""
-    world = scene.world
+def world_of(scene: bpy.types.Scene, view_layer: str | None = None) -> bpy.types.World | None:
+    """The world that a view layer is rendered with (default: the one that is captured): its
+    override, or the scene's."""
+    layer = scene.view_layers.get(view_layer or layer_of(scene))
+    return (layer.world_override if layer else None) or scene.world
+
+
+def check_world(scene: bpy.types.Scene, view_layer: str | None = None) -> bpy.types.World:
+    """The world of a view layer. Raises SceneError where there is none, it has a volume, or an
+    image of it is missing."""
+    world = world_of(scene, view_layer)
     if world is None:
         raise SceneError(
             "the scene has no world to relight with: add one with an HDRI (World properties)"
@@ -33,13 +42,58 @@ def check_world(scene: bpy.types.Scene) -> None:
                         f"the world's image '{image.name}' is missing on disk ({path}): find it "
                         "again (File, External Data, Find Missing Files), or choose another"
                     )
+    return world
+
+
+def _fills(socket: bpy.types.NodeSocket) -> bool:
+    """Whether what is linked to a volume socket is anything: not muted, not of density 0."""
+    link = next((i for i in socket.links if not i.is_muted), None)
+    if link is None:
+        return False
+    node = link.from_node
+    handed_on = [s for s in node.inputs if s.type == "SHADER"]
+    if node.bl_idname == "NodeReroute" or handed_on:
+        return any(_fills(s) for s in handed_on or node.inputs)
+    if node.mute:
+        return False
+    amounts = ("Density", "Emission Strength", "Blackbody Intensity")
+    found = [s for s in node.inputs if s.name in amounts and s.enabled]
+    return not found or any(s.is_linked or s.default_value for s in found)
 
 
 def check_no_volume(world: bpy.types.World) -> None:
     """Raise SceneError for a world filled with fog: it swallows light from afar, an HDRI's too."""
     out = world.node_tree.get_output_node("CYCLES") if world.node_tree else None
-    if out and out.inputs["Volume"].is_linked:
+    if out and _fills(out.inputs["Volume"]):
         raise SceneError(
             "the world has a volume, which swallows all light from afar: put the fog into an "
             "object around the scene instead"
         )
+
+
+# Kinds of rays that a world may shine differently for, and none of which a map can tell apart.
+_KINDS = ("diffuse", "glossy", "transmission", "scatter")
+_OF_CAMERA = {"Is Camera Ray", "Is Shadow Ray"}
+
+
+def differs_by_rays(world: bpy.types.World) -> str:
+    """What a world does that one map of its light cannot, and what is used instead; "" if nothing.
+
+    A world that shows the camera alone something else is no such world.
+    """
+    rays = world.cycles_visibility
+    seen = [kind for kind in _KINDS if getattr(rays, kind)]
+    if 0 < len(seen) < len(_KINDS):
+        hidden = " and ".join(k for k in _KINDS if k not in seen)
+        return f"hidden from {hidden} rays: all rays see it alike here"
+    for tree in trees(world.node_tree, set()):
+        for node in tree.nodes:
+            if node.bl_idname != "ShaderNodeLightPath":
+                continue
+            for socket in node.outputs:
+                if socket.is_linked and socket.name not in _OF_CAMERA:
+                    return (
+                        f"mixed by '{socket.name}': all rays see what a ray through clear glass "
+                        "sees here"
+                    )
+    return ""

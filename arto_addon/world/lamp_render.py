@@ -20,10 +20,8 @@ from ...core.field import Field
 from ...core.region import Region
 from ..stage.settings import prepare
 from ..stage.small import parts_of, small
-from ..stage.stage import Stage, set_region, stage
+from ..stage.stage import Stage, free_mark, set_region, stage
 from ..work import Steps
-
-GROUP = "ARTO_lamps"
 
 
 def world_of(on: Stage, shown: Environment, group: str = "") -> Any:
@@ -68,10 +66,10 @@ def lamp_light(
     """
     region = region_of(field)
     out: NDArray[np.float32] = np.zeros((*field.shape, 3), np.float32)
-    with _lit_by(scene, field, lamps) as on:
+    with _lit_by(scene, field, lamps) as (on, group):
         on.change("cycles.samples", samples)
         parts = yield from parts_of(on, "rendering the world's lamps", share)
-        out[region.slices] = _light_in(parts)
+        out[region.slices] = _light_in(parts, group)
     return out
 
 
@@ -84,27 +82,33 @@ def brightness(scene: bpy.types.Scene, field: Field, light: Environment, share: 
 
     Raises SceneError, CancelledError; the scene stays as it is.
     """
-    with _lit_by(scene, field, light) as on, small(on, HELD_SAMPLES):
+    with _lit_by(scene, field, light) as (on, group), small(on, HELD_SAMPLES):
         parts = yield from parts_of(on, "looking how bright the world's light is", share)
-        return _light_in(parts).mean(axis=(0, 1), dtype=np.float64)
+        return _light_in(parts, group).mean(axis=(0, 1), dtype=np.float64)
 
 
 @contextmanager
-def _lit_by(scene: bpy.types.Scene, field: Field, shown: Environment) -> Iterator[Stage]:
-    """A stage of a field's picture with a map as its world, in the light group `GROUP`."""
+def _lit_by(
+    scene: bpy.types.Scene, field: Field, shown: Environment
+) -> Iterator[tuple[Stage, str]]:
+    """A stage of a field's picture with a map as its world, and the light group of that."""
     with stage(scene, field.about["view_layer"]) as on:
         # whatever the artist looks at meanwhile: the field is Cycles'
         on.change("render.engine", "CYCLES")
         prepare(on, layers=0)
-        on.scene.world = world_of(on, shown, GROUP)
-        on.scene.view_layers[0].lightgroups.add(name=GROUP)
+        # a render like any of the artist's: what tames its fireflies does no harm to a field
+        for name in ("sample_clamp_direct", "sample_clamp_indirect"):
+            on.change(f"cycles.{name}", getattr(scene.cycles, name))
+        group = free_mark() + "lamps"
+        on.scene.world = world_of(on, shown, group)
+        on.scene.view_layers[0].lightgroups.add(name=group)
         set_region(on.scene, region_of(field))
-        yield on
+        yield on, group
 
 
-def _light_in(parts: dict[str, NDArray]) -> NDArray[np.float32]:
-    """The light of the group `GROUP` in a render's parts, (H, W, 3). Raises SceneError."""
-    light = next((p for name, p in parts.items() if name.endswith(GROUP)), None)
+def _light_in(parts: dict[str, NDArray], group: str) -> NDArray[np.float32]:
+    """The light of a group in a render's parts, (H, W, 3). Raises SceneError."""
+    light = next((p for name, p in parts.items() if name.endswith(group)), None)
     if light is None:
         raise SceneError(
             "Blender wrote no light of the world's lamps: turn Render Lamps off to relight "

@@ -18,8 +18,11 @@ from ..work import Render, blocking_render
 
 
 @contextmanager
-def studio_scene(scene: bpy.types.Scene, name: str) -> Iterator[tuple[Any, list[Any]]]:
-    """A new scene with the artist's world and frame and nothing else; removed at the end.
+def studio_scene(
+    scene: bpy.types.Scene, world: bpy.types.World, name: str
+) -> Iterator[tuple[Any, list[Any]]]:
+    """A new scene with a world of the artist's, the scene's frame and nothing else; removed at the
+    end.
 
     Yields the scene and the list of data-blocks to remove with it.
     """
@@ -27,7 +30,7 @@ def studio_scene(scene: bpy.types.Scene, name: str) -> Iterator[tuple[Any, list[
     made: list[Any] = []
     try:
         studio.render.engine = "CYCLES"
-        studio.world = scene.world.copy()
+        studio.world = world.copy()
         made.append(studio.world)
         # nothing is lit here, so no map of where the light comes from is needed
         studio.world.cycles.sampling_method = "NONE"

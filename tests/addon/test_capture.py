@@ -404,3 +404,18 @@ def test_keys_and_drivers_do_not_overrule_the_stage(tmp_path):
     np.testing.assert_allclose(driven.alpha, plain.alpha, atol=1e-5)
     assert not differences(before, snapshot())
     assert len(bpy.data.actions) == 1
+
+
+def test_light_groups_of_the_artist_are_never_ours(tmp_path):
+    """A sun in a group named like one of ours, once it has even the name with a number: its light
+    is in the own layer and not in a patch."""
+    scene = small_scene(tmp_path, lamp=True)
+    plain = captured(scene).read(0)
+    assert plain.own.mean() > 0.05
+    scene.view_layers[0].lightgroups.add(name="ARTO_0000_white")
+    scene.objects["Sun"].lightgroup = "ARTO_0000_white"
+    for taken in ("", "ARTO-2_0001_u1"):
+        scene.objects["Floor"].lightgroup = taken
+        found = captured(scene).read(0)
+        np.testing.assert_allclose(found.own, plain.own, atol=1e-4)
+        np.testing.assert_allclose(found.basis, plain.basis, atol=1e-5)

@@ -160,7 +160,7 @@ def test_pixels_that_are_no_number_are_said(shot, monkeypatch):
     def broken(path):
         parts = read(path)
         for name, pixels in parts.items():
-            if name.endswith(lamps.GROUP):
+            if name.endswith("ARTO_lamps"):
                 pixels[3, 4] = np.nan
         return parts
 
@@ -171,6 +171,25 @@ def test_pixels_that_are_no_number_are_said(shot, monkeypatch):
     monkeypatch.undo()
     assert len(bpy.data.scenes) == scenes
     np.testing.assert_array_equal(read(paths.relit_file(shot))[""], before)
+
+
+def test_the_lamps_are_clamped_as_the_artist_clamps(shot):
+    """Their render is an ordinary one: with its light clamped to a tenth no path brings more (its
+    channels together three times that), and the scene's own lamp, in a group named as ours is,
+    stays out of it."""
+    field = Field(paths.field_folder(shot))
+    found = split(bake(shot, 256)).lamps
+    free = work.run(lamps.lamp_light(shot, field, found, 64))
+    assert free.max() > 1.5
+    own = shot.cycles.sample_clamp_indirect
+    shot.cycles.sample_clamp_direct = shot.cycles.sample_clamp_indirect = 0.1
+    shot.objects["Sun"].lightgroup = "ARTO_lamps"
+    try:
+        clamped = work.run(lamps.lamp_light(shot, field, found, 64))
+    finally:
+        shot.cycles.sample_clamp_direct, shot.cycles.sample_clamp_indirect = 0.0, own
+        shot.objects["Sun"].lightgroup = ""
+    assert 0.01 < clamped.max() < 0.6
 
 
 def test_a_near_hemicube_keeps_its_lamps(tmp_path):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from arto.arto_addon.world.background import background
 from arto.arto_addon.world.bake import bake
+from arto.arto_addon.world.check import differs_by_rays
 from arto.core.errors import SceneError
 from arto.core.region import Region
 from scene_tools import set_colour
@@ -164,6 +165,32 @@ def test_world_hidden_from_the_camera_still_lights(scene):
     scene.world.cycles_visibility.camera = False
     np.testing.assert_allclose(bake(scene, 64).image, 0.5, atol=1e-4)
     assert background(scene).max() == 0
+
+
+@pytest.mark.parametrize("kind", ["diffuse", "glossy", "transmission", "scatter"])
+def test_world_hidden_from_a_kind_of_rays_is_said_and_lights(scene, kind):
+    """One map for all kinds: it has the light, and what it cannot tell apart is said."""
+    set_colour(scene, (0.5, 0.5, 0.5))
+    assert differs_by_rays(scene.world) == ""
+    setattr(scene.world.cycles_visibility, kind, False)
+    np.testing.assert_allclose(bake(scene, 64).image, 0.5, atol=1e-4)
+    assert f"hidden from {kind} rays" in differs_by_rays(scene.world)
+
+
+def test_world_hidden_from_all_is_dark(scene):
+    for kind in ("diffuse", "glossy", "transmission", "scatter"):
+        setattr(scene.world.cycles_visibility, kind, False)
+    assert bake(scene, 64).image.max() == 0
+    assert differs_by_rays(scene.world) == ""
+
+
+@pytest.mark.parametrize("name", ["Is Glossy Ray", "Is Diffuse Ray", "Ray Depth", "Is Camera Ray"])
+def test_world_mixed_by_rays_is_said(scene, name):
+    tree = scene.world.node_tree
+    rays = tree.nodes.new("ShaderNodeLightPath")
+    tree.links.new(rays.outputs[name], tree.nodes["Background"].inputs["Strength"])
+    said = differs_by_rays(scene.world)
+    assert said == "" if name == "Is Camera Ray" else f"'{name}'" in said
 
 
 def test_no_world_and_missing_image(scene, tmp_path):

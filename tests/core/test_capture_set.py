@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 import pytest
 from arto.core import capture_set, exr
 from arto.core.capture_set import HEADER, CaptureSet
@@ -103,6 +104,20 @@ def test_names_with_a_view_layer_are_understood(folder: Path, scene) -> None:
     held = exr.read(folder / FILE)
     exr.write(folder / FILE, {f"View Layer.{name}": px for name, px in held.items()})
     np.testing.assert_array_equal(CaptureSet(folder).read(0).basis, scene(CUBE).basis)
+
+
+def test_layers_interleaved_in_one_part_are_the_same(folder: Path) -> None:
+    """As Blender writes them in a scene that was saved before its version 5."""
+    before = CaptureSet(folder).read(0)
+    planes = {}
+    for name, pixels in exr.read(folder / FILE).items():
+        for n, c in enumerate("RGBA"[: pixels.shape[-1]]):
+            planes[f"ViewLayer.{name}.{c}"] = np.ascontiguousarray(pixels[..., n])
+    head = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(head, planes).write(str(folder / FILE))
+    after = CaptureSet(folder).read(0)
+    for name in ("basis", "own", "alpha"):
+        np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
 
 
 def test_a_tile_may_lie_in_several_files(tmp_path: Path, scene, write_scene) -> None:

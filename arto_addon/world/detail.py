@@ -1,0 +1,119 @@
+"""How fine a world is: what its nodes can draw, read from the nodes."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import bpy
+
+from ..blender.nodes import trees
+
+# The width of a map in which a lamp of a tenth of a degree is two texels wide. What nodes draw may
+# be as fine as that, and what is finer is not looked for.
+FINEST = 8192
+
+# What hands on what it is given, or turns it.
+_STRUCTURE = {
+    "NodeFrame",
+    "NodeGroupInput",
+    "NodeGroupOutput",
+    "NodeReroute",
+    "ShaderNodeAddShader",
+    "ShaderNodeBackground",
+    "ShaderNodeEmission",
+    "ShaderNodeGroup",
+    "ShaderNodeMapping",
+    "ShaderNodeMixShader",
+    "ShaderNodeOutputWorld",
+    "ShaderNodeTexCoord",
+    "ShaderNodeVectorRotate",
+}
+# What computes a value from values, or is one: as even as what it is given, where that is no
+# direction.
+_VALUES = {
+    "NodeReroute",
+    "ShaderNodeBlackbody",
+    "ShaderNodeBrightContrast",
+    "ShaderNodeClamp",
+    "ShaderNodeCombineColor",
+    "ShaderNodeCombineXYZ",
+    "ShaderNodeFloatCurve",
+    "ShaderNodeGamma",
+    "ShaderNodeHueSaturation",
+    "ShaderNodeInvert",
+    "ShaderNodeLightPath",
+    "ShaderNodeMapRange",
+    "ShaderNodeMath",
+    "ShaderNodeMix",
+    "ShaderNodeMixRGB",
+    "ShaderNodeRGB",
+    "ShaderNodeRGBCurve",
+    "ShaderNodeRGBToBW",
+    "ShaderNodeSeparateColor",
+    "ShaderNodeSeparateXYZ",
+    "ShaderNodeValToRGB",
+    "ShaderNodeValue",
+    "ShaderNodeVectorMath",
+    "ShaderNodeWavelength",
+}
+_TURNED = {"NodeReroute", "ShaderNodeMapping", "ShaderNodeTexCoord", "ShaderNodeVectorRotate"}
+
+
+def _above(node: Any, ends: set[str]) -> set[Any]:
+    """The nodes that a node's inputs come from, without what lies above nodes of kinds `ends`."""
+    found: set[Any] = set()
+    todo = [node]
+    while todo:
+        for socket in todo.pop().inputs:
+            for link in socket.links:
+                if link.from_node not in found:
+                    found.add(link.from_node)
+                    if link.from_node.bl_idname not in ends:
+                        todo.append(link.from_node)
+    return found
+
+
+def _of_texture(node: Any) -> int:
+    """The width of a map as fine as an environment texture, as its nodes turn it."""
+    above = _above(node, set())
+    if node.projection != "EQUIRECTANGULAR" or any(n.bl_idname not in _TURNED for n in above):
+        return FINEST
+    stretch = 1.0
+    for mapping in (n for n in above if n.bl_idname == "ShaderNodeMapping"):
+        scale = [abs(x) for x in mapping.inputs["Scale"].default_value]
+        moved = any(s.is_linked for s in mapping.inputs if s.name != "Vector") or any(
+            mapping.inputs["Location"].default_value if "Location" in mapping.inputs else ()
+        )
+        if moved or min(scale) == 0:
+            return FINEST
+        stretch *= max(scale) / min(scale)
+    return math.ceil(node.image.size[0] * stretch) if node.image else 0
+
+
+def detail(world: bpy.types.World) -> int:
+    """The width of a map that holds whatever the world shows, 1 to `FINEST`.
+
+    Textures are as fine as their pixels, a sky as its sun; other nodes that know of a direction may
+    draw anything with it.
+    """
+    widest = 1
+    textures = {"ShaderNodeTexEnvironment", "ShaderNodeTexSky"}
+    for tree in trees(world.node_tree, set()):
+        for node in tree.nodes:
+            kind = node.bl_idname
+            if node.outputs and not any(s.is_linked for s in node.outputs):
+                continue
+            if kind == "ShaderNodeTexEnvironment":
+                widest = max(widest, _of_texture(node))
+            elif kind == "ShaderNodeTexSky":
+                # two texels across its sun
+                sun = math.degrees(node.sun_size) if node.sun_disc else 1.0
+                widest = max(widest, math.ceil(2 * 360 / max(sun, 1e-3)))
+            elif kind in _STRUCTURE:
+                continue
+            elif kind not in _VALUES or any(
+                n.bl_idname not in _VALUES | textures for n in _above(node, textures)
+            ):
+                return FINEST
+    return min(widest, FINEST)

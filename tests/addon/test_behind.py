@@ -1,0 +1,126 @@
+"""What stands behind the plate, beside Cycles' own picture of the scene with its world."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+from arto.arto_addon import work
+from arto.arto_addon.blender.output import float_exr, write_to
+from arto.arto_addon.relight import relight
+from arto.arto_addon.stage.stage import stage
+from arto.arto_addon.world.background import background
+from arto.core import exr
+from scene_tools import small_scene
+from test_relight import run_all
+from test_world import hdri, smooth
+
+
+def own_picture(scene, samples, folder, seed=1, empty=False):
+    """What F12 renders of the scene as it is, but for noise -> (H, W, 4)."""
+    with stage(scene, scene.view_layers[0].name) as on:
+        float_exr(on.scene.render, multilayer=False)
+        cycles = on.scene.cycles
+        cycles.samples, cycles.seed, cycles.sample_clamp_indirect = samples, seed, 0
+        cycles.use_adaptive_sampling = cycles.use_denoising = False
+        for thing in on.scene.objects if empty else ():
+            thing.hide_render = True
+        write_to(on.scene.render, folder / "own.exr")
+        request = work.Render(on.scene.name, 0, "")
+        work.blocking_render(request)
+        request.check()
+        for thing in on.scene.objects if empty else ():
+            thing.hide_render = False
+    return next(iter(exr.read(folder / "own.exr").values()))
+
+
+def sky(folder):
+    scene = small_scene(folder)
+    scene.camera.rotation_euler.x = math.radians(80)
+    hdri(scene, smooth(), rotation=0.5)
+    scene.arto.samples, scene.arto.patches, scene.arto.patterns = 256, 4, "linear"
+    return scene
+
+
+@pytest.mark.parametrize("how", ["object", "collection", "shader", "region", "plain"])
+def test_plate_over_its_world(tmp_path, how):
+    """With a film that is opaque: holes are black and transparent, outside a region is nothing, and
+    all else is as near to Cycles as two of its seeds."""
+    scene = sky(tmp_path)
+    matt = scene.objects["Matt"]
+    if how == "object":
+        matt.is_holdout = True
+    elif how == "collection":
+        held = bpy.data.collections.new("Held")
+        scene.collection.children.link(held)
+        scene.collection.objects.unlink(matt)
+        held.objects.link(matt)
+        scene.view_layers[0].layer_collection.children["Held"].holdout = True
+    elif how == "shader":
+        tree = matt.data.materials[0].node_tree
+        hole = tree.nodes.new("ShaderNodeHoldout")
+        tree.links.new(hole.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+    elif how == "region":
+        scene.render.use_border = True
+        scene.render.border_min_x, scene.render.border_max_x = 0.25, 0.75
+        scene.render.border_min_y, scene.render.border_max_y = 0.5, 1.0
+    picture = run_all(scene)
+    one, two = (own_picture(scene, 256, tmp_path, seed) for seed in (1, 2))
+    assert picture.shape == one.shape
+    if how != "plain":
+        assert (one[..., 3] == 0).sum() > 10
+    np.testing.assert_allclose(picture[..., 3], one[..., 3], atol=0.1)
+    assert np.abs(picture[..., 3] - one[..., 3]).mean() < 0.01
+    noise = np.abs(one - two)[..., :3].mean()
+    assert np.abs(picture - one)[..., :3].mean() < 2 * noise + 0.01
+    assert abs(picture[..., :3].mean() / one[..., :3].mean() - 1) < 0.01
+
+
+@pytest.mark.parametrize("what", ["motion", "fisheye", "aspect", "exposure", "shift"])
+def test_the_world_behind_is_seen_as_the_scene_sees_it(tmp_path, what):
+    """Beside Cycles' own render of the scene with everything hidden."""
+    scene = sky(tmp_path)
+    pixels = np.kron(np.random.default_rng(3).random((16, 32, 3)), np.ones((8, 8, 1)))
+    for node in scene.world.node_tree.nodes:
+        if node.bl_idname == "ShaderNodeTexEnvironment":
+            image = bpy.data.images.new("Rough", 256, 128, float_buffer=True)
+            image.colorspace_settings.name = "Linear Rec.709"
+            rgba = np.dstack([pixels, np.ones((128, 256))]).astype(np.float32)
+            image.pixels.foreach_set(rgba.ravel())
+            image.pack()
+            node.image = image
+    plain = background(scene)
+    camera = scene.camera
+    if what == "motion":
+        scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 1.0
+        for frame, angle in ((0, -0.3), (2, 0.3)):
+            camera.rotation_euler.z = angle
+            camera.keyframe_insert("rotation_euler", index=2, frame=frame)
+        scene.frame_set(1)
+    elif what == "fisheye":
+        camera.data.type, camera.data.panorama_type = "PANO", "FISHEYE_EQUISOLID"
+        camera.data.fisheye_fov, camera.data.fisheye_lens = 2.0, 12.0
+    elif what == "aspect":
+        scene.render.pixel_aspect_x = 2.0
+    elif what == "exposure":
+        scene.cycles.film_exposure, scene.cycles.filter_width = 2.0, 4.0
+    else:
+        camera.data.shift_x = 0.3
+    found = background(scene)
+    truth = own_picture(scene, 256, tmp_path, empty=True)[..., :3]
+    assert np.abs(found - plain).mean() > 0.05
+    assert np.abs(found - truth).mean() < 0.02
+    assert found.mean() == pytest.approx(truth.mean(), rel=0.01)
+
+
+def test_transparent_glass_is_said(tmp_path):
+    scene = small_scene(tmp_path)
+    scene.render.film_transparent = scene.cycles.film_transparent_glass = True
+    scene.arto.samples = 4
+    run_all(scene)
+    steps = []
+    path, _ = work.run(relight.relight(scene), steps.append)
+    assert any("Transparent Glass" in s.text for s in steps)
+    assert "Transparent Glass" in exr.header(path)["arto.glass"]

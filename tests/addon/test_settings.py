@@ -1,0 +1,35 @@
+"""What a capture changes is what the docs say; the panel says where a render looks otherwise."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import arto
+from arto.arto_addon.stage.settings import CHANGES, looks_otherwise, page
+from scene_tools import captured, small_scene
+
+DOCS = Path(arto.__file__).parent / "docs"
+
+
+def test_the_page_is_made_of_the_table():
+    assert (DOCS / "capture-changes.md").read_text(encoding="utf-8") == page()
+
+
+def test_what_was_changed_is_in_the_table(tmp_path):
+    scene = small_scene(tmp_path)
+    changed = captured(scene).head["changed"]
+    assert changed.keys() - {"world"} <= {c.setting for c in CHANGES}
+    assert changed["cycles.sample_clamp_indirect"] == [10.0, 0.0]
+
+
+def test_lines_for_settings_that_look_otherwise(tmp_path):
+    scene = small_scene(tmp_path)
+    assert looks_otherwise(scene) == ["Your render clamps at 10; the relit picture does not"]
+    scene.cycles.sample_clamp_indirect = 0
+    assert looks_otherwise(scene) == []
+    scene.cycles.use_fast_gi = True
+    scene.cycles.sample_clamp_direct = 2.5
+    assert looks_otherwise(scene) == [
+        "Your render clamps direct light at 2.5; the relit picture does not",
+        "Your render uses Fast GI; the relit picture has all its bounces",
+    ]
