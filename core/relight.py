@@ -46,9 +46,10 @@ def _light(tile: Tile, light: PatchLight) -> NDArray[np.float32]:
         out = np.zeros((7, tile.region.pixels), np.float32)
         for k in range(first, tile.patches, SUMS):
             if weights[k]:
-                here = tile.codes[k] == REST
+                # times 0 or 1: numpy is slow at adding only where a mask is
+                here = (tile.codes[k] == REST).astype(np.float32)
                 for row, value in zip(out[3:], weighted[k].astype(np.float32), strict=True):
-                    np.add(row, value, out=row, where=here)
+                    row += here * value
             for e in tile.entries(k):
                 radiance = e.support.average(light, k, e.parameters)
                 light_of = e.coefficient * radiance.astype(np.float32, copy=False)
