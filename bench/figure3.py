@@ -51,7 +51,7 @@ def figure3(path: Path, size: tuple[int, int], samples: int) -> None:
         basis = data.basis[:, :, row, column]
         size_of = basis[:, 0].sum(axis=-1)
         for k in range(len(cube)):
-            moments = Moments.from_basis(basis[k][:, None, :], source.patterns)
+            moments = Moments.from_basis(basis[k][:, None, :], source.patterns, cube.extent(k))
             u0, u1, v0, v1 = BOX.fit(moments)[0]
             face = cube.grid[k][0]
             x, y = _PLACES[face]

@@ -21,6 +21,7 @@ from arto.core.field import Field
 from arto.core.fit import fit
 from arto.core.light import PatchLight
 from arto.core.relight import relight
+from arto.core.supports import NOTHING, REST
 from numpy.typing import NDArray
 
 from . import reference, scenes
@@ -178,7 +179,7 @@ def entry_shares(
     codes = np.asarray(field.tiles[0].codes)
     for name, number in materials.items():
         chosen = codes[:, (index == number).ravel()]
-        lit = max(int((chosen > 0).sum()), 1)
+        lit = max(int((~np.isin(chosen, (NOTHING, REST))).sum()), 1)
         out[name] = {
             model: float((chosen == code).sum() / lit)
             for code, model in ((1, "whole"), (2, "linear"), (3, "box"))

@@ -206,6 +206,7 @@ def run_case(
     """All models on one case with one kind of noise."""
     rng = np.random.default_rng([sum(map(ord, case)), 1])
     light = next(iter(lights.values()))
+    extent = light.hemicube.extent(PATCH)
     u, v = light.bin_centres(PATCH)
     transport = CASES[case](rng, u[None, :], v[:, None])
     # a transport counts by solid angle
@@ -220,11 +221,11 @@ def run_case(
     rows = []
     for name in [*SUPPORTS, "search"]:
         begun = time.perf_counter()
-        moments = Moments.from_basis(basis, patterns)
+        moments = Moments.from_basis(basis, patterns, extent)
         support = SUPPORTS.get(name, BOX)
         if name == "search":
             clear = np.where(usable[None, :, None], basis, 0)
-            parameters = search(clear, patterns, 1, follow=False)
+            parameters = search(clear, patterns, extent, 1, follow=False)
         else:
             parameters = support.fit(moments)
         seconds = time.perf_counter() - begun

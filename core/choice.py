@@ -6,10 +6,10 @@ light paths an entry had is known from the capture's grain, and decides how its 
 - A *box* must be shown. Its spread must explain the moments better than a linear density's by more
   than two parameters would by chance: Akaike's criterion with the correction for few samples
   (AICc). Two points in a patch are no evidence of a narrow support, however often one was hit.
-- The *whole patch* must be shown too: that the light's mean is where a uniform
-  transport's is (which is not the middle: `measure`), to `CENTRED`. A mean
-  that is not known is kept as it is, in the linear projection. That is noise, but unbiased noise,
-  which averages out over pixels and can be denoised; a mean rounded to the middle stays wrong.
+- The *whole patch* must be shown too: that the light's mean is that of the patch, seen evenly by
+  solid angle, to `CENTRED`. A mean that is not known is kept as it is, in the linear projection.
+  That is noise, but unbiased noise, which averages out over pixels and can be denoised; a mean
+  rounded to the middle stays wrong.
 - Enough evidence still does not make a box the better filter. A reflection that is narrow both ways
   is one; what is broad, or narrow one way only, is mostly a diffuse view of a patch that something
   hides in part, and there a box lets a sun in or shuts it out by its edge's last digit, while the
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from .errors import FieldError
 from .evidence import Evidence
-from .measure import uniform_moments
+from .measure import Extent
 from .moments import Moments
 from .patterns import ONE, UU, VV, PatternSet, U, V
 from .supports import BOX, LINEAR, NOTHING, PER_CHANNEL, SUPPORTS, WHOLE, Support
@@ -32,10 +32,13 @@ from .supports import BOX, LINEAR, NOTHING, PER_CHANNEL, SUPPORTS, WHOLE, Suppor
 SEARCH = "search"
 STAGE_AND_MATTE = "stage_and_matte"
 CHOICES = ("auto", *SUPPORTS, SEARCH, STAGE_AND_MATTE)
-# A mean this near to the uniform transport's, its own uncertainty included, is that one.
+# A mean this near to the whole patch's, its own uncertainty included, is the whole patch's.
 CENTRED = 0.02
 # Half width, of the patch, from which on the linear projection beats the box.
 BROAD = 0.35
+# How far the root of three variances may be off a box's half width of `BROAD`, relative: on a patch
+# as large as a face it is a tenth.
+BENT = 0.15
 
 
 def check(choice: str, patterns: PatternSet, separate: bool = False) -> None:
@@ -72,39 +75,43 @@ def _smallest(moments: Moments, hits: NDArray) -> NDArray[np.uint8]:
     Moments without spreads (NaN) leave the box out.
     """
     n = np.maximum(hits, 1e-9)
-    # what the patch's uniform transport has: its mean is not the middle, seen from the scene
-    uniform = uniform_moments(moments.extent)
-    middle = uniform[[U, V]]
-    spread = uniform[[UU, VV]] - middle**2
-    offs = [mean - m for mean, m in zip(moments.mean, middle, strict=True)]
-    uncertain = np.sqrt(spread.sum() / n)
+    even = moments.uniform
+    offs = [mean - middle for mean, middle in zip(moments.mean, even[[U, V]], strict=True)]
+    spreads = even[[UU, VV]] - even[[U, V]] ** 2
+    uncertain = np.sqrt(spreads.sum() / n)
     centred = np.sqrt(offs[0] * offs[0] + offs[1] * offs[1]) + uncertain < CENTRED
     codes = np.where(centred, WHOLE.code, LINEAR.code).astype(np.uint8)
     if np.isfinite(moments.variance).any():
-        codes[_shown_box(moments, offs, spread, n)] = BOX.code
+        codes[_shown_box(moments, offs, spreads, n)] = BOX.code
     return codes
 
 
 def _shown_box(
-    moments: Moments, offs: list[NDArray], uniform: NDArray, n: NDArray
+    moments: Moments, offs: list[NDArray], spreads: NDArray, n: NDArray
 ) -> NDArray[np.bool_]:
     """Where a box is shown, and narrow enough to be the better filter -> (n,).
 
-    offs: the means' distances from the uniform transport's, along u and v; uniform: (2,) its
-    variances; n: hits.
+    offs: the means' distances from the whole patch's, along u and v; spreads: the variances of the
+    whole patch; n: hits.
     """
     spread_gain = np.zeros(len(n))
-    narrow = np.ones(len(n), bool)
-    for off, variance, whole in zip(offs, moments.variance, uniform, strict=True):
+    widest = np.zeros(len(n))
+    for off, variance, even in zip(offs, moments.variance, spreads, strict=True):
         # twice the gain in log likelihood, a sample, of a spread of its own over that of a linear
-        # density, which is the uniform one's less off^2
-        expected = np.maximum(whole - off * off, whole / 4)
+        # density, that of the whole patch less off^2
+        expected = np.maximum(even - off * off, even / 4)
         ratio = np.maximum(variance / expected, 1e-9)
         spread_gain += ratio - 1 - np.log(ratio)
-        narrow &= 3 * variance < BROAD**2
+        np.maximum(widest, 3 * variance, out=widest)
     with np.errstate(invalid="ignore"):
         box = np.where(np.isinf(n), True, n * spread_gain > _aicc(4, n) - _aicc(2, n))
-    return narrow & box
+    # the half width by the variance alone, which solid angle bends by less than `BENT`
+    widest = np.sqrt(widest)
+    box &= widest < BROAD * (1 + BENT)
+    near = np.flatnonzero(box & (widest > BROAD * (1 - BENT)))
+    edges = BOX.fit(moments.select(near))
+    box[near] = np.maximum(edges[:, 1] - edges[:, 0], edges[:, 3] - edges[:, 2]) < 2 * BROAD
+    return box
 
 
 def choose(
@@ -114,24 +121,26 @@ def choose(
     patterns: PatternSet,
     known: Evidence,
     k: int,
+    extent: Extent,
     separate: bool = False,
 ) -> tuple[NDArray[np.uint8], dict[int, NDArray]]:
     """Model codes of n pixels for patch k, and for each code in use the parameters of its pixels.
 
     basis: (P, n, 3), the patch's images; coefficient: (n, 3) of theirs, the very numbers that the
     evidence is of (worked out again, they may differ in the last digit, and what is just bright
-    enough be lost); choice: `auto`, or one model for every pixel that gets light from the patch;
-    separate: supports of each channel's own.
+    enough be lost); extent: of patch k on its face; choice: `auto`, or one model for every pixel
+    that gets light from the patch; separate: supports of each channel's own.
     """
     codes = np.full(basis.shape[1], NOTHING, np.uint8)
     if choice == "auto":
-        # most entries are too dark to keep: what they see of their patch is not asked for
-        lit = known.kept(coefficient)
-        moments = Moments.from_basis(basis[:, lit], patterns, separate, known.extent(k))
+        # most entries are too dark to keep: what they see of their patch is not asked for, and
+        # their light goes into the pixel's rest
+        lit = known.kept(k, coefficient)
+        moments = Moments.from_basis(basis[:, lit], patterns, extent, separate)
         codes[lit] = _smallest(moments, known.hits(k, coefficient)[lit])
     else:
         lit = np.flatnonzero((coefficient > 0).any(axis=-1))
-        moments = Moments.from_basis(basis[:, lit], patterns, separate, known.extent(k))
+        moments = Moments.from_basis(basis[:, lit], patterns, extent, separate)
         codes[lit] = SUPPORTS[choice].code
     found: dict[int, NDArray] = {}
     chosen = codes[lit]

@@ -13,9 +13,13 @@ from numpy.typing import NDArray
 
 from .moments import channel_sum
 
-# Entries are dropped as nothing, smallest first, while what is dropped stays under this share of
-# the pixel's light.
+# Entries are dropped into the pixel's rest, smallest first, while what is dropped stays under this
+# share of the pixel's light.
 DROPPED = 1e-3
+# But for an entry that a sun could make more than this share of its pixel: one that gives as much
+# light as a whole even sky, pi, and all of it on that entry's patch. Small patches are what that is
+# about, where a sun is a thousand times the sky.
+SUN = 0.01
 # Pixels whose entries are sorted at a time: as many as fit the cache with their patches.
 BLOCK = 2048
 # Pixels along the side of the window that an entry's noise is measured in.
@@ -27,26 +31,23 @@ class Evidence:
     """How far the moments of a tile can be believed, and which are too small to keep.
 
     least: (n,) coefficient, summed over channels, under which an entry is dropped; total: (n,) that
-    of all patches; shape: (h, w) of the tile, n = h x w; samples: samples a pixel of the capture,
-    None without noise (photographs); grain: (K, h, w), see `capture_set.GRAIN`; extents: (K, 4),
-    `Hemicube.extents`, None where the patches are to be taken for uniform in area.
+    of all patches; shape: (h, w) of the tile, n = h x w; solid_angles: (K,) of the patches;
+    samples: samples a pixel of the capture, None without noise (photographs); grain: (K, h, w), see
+    `capture_set.GRAIN`.
     """
 
     least: NDArray
     total: NDArray
     shape: tuple[int, int]
+    solid_angles: NDArray
     samples: float | None = None
     grain: NDArray | None = None
-    extents: NDArray | None = None
 
-    def extent(self, k: int) -> NDArray | None:
-        """Where patch k is on its face, None where that is not known."""
-        return None if self.extents is None else self.extents[k]
-
-    def kept(self, coefficient: NDArray) -> NDArray[np.intp]:
-        """The pixels in which a patch of these coefficients, (n, 3), is more than nothing."""
+    def kept(self, k: int, coefficient: NDArray) -> NDArray[np.intp]:
+        """The pixels in which patch k, of these coefficients, (n, 3), is an entry."""
         size = channel_sum(coefficient)
-        return np.flatnonzero((size > 0) & (size >= self.least))
+        under_a_sun = SUN * self.solid_angles[k] / np.pi * self.total
+        return np.flatnonzero((size > 0) & ((size >= self.least) | (size > under_a_sun)))
 
     def hits(self, k: int, coefficient: NDArray) -> NDArray:
         """How many equal light paths would be as noisy as what reached patch k -> (n,).
@@ -72,9 +73,9 @@ class Evidence:
 def evidence(
     coefficients: NDArray,
     shape: tuple[int, int],
+    solid_angles: NDArray,
     samples: float | None = None,
     grain: NDArray | None = None,
-    extents: NDArray | None = None,
 ) -> Evidence:
     """What is known of a tile: see `Evidence`. coefficients: (K, n, 3) of all patches."""
     pixels = coefficients.shape[1]
@@ -87,7 +88,7 @@ def evidence(
         kept = np.cumsum(size, axis=1) > DROPPED * total[block, None]
         # the smallest entry that must be kept
         least[block] = np.take_along_axis(size, kept.argmax(axis=1)[:, None], axis=1)[:, 0]
-    return Evidence(least, total, shape, samples, grain, extents)
+    return Evidence(least, total, shape, solid_angles, samples, grain)
 
 
 def _window_sum(image: NDArray) -> NDArray:

@@ -63,7 +63,7 @@ class Tile:
 
     @cached_property
     def codes(self) -> NDArray[np.uint8]:
-        """(K, n): which model each entry has, 0 for none."""
+        """(K, n): which model each entry has; 0 for no light, `REST` for light in the rest."""
         return self._load("codes", (self.patches, self.region.pixels))
 
     def layer(self, name: str) -> NDArray[np.float32]:
@@ -104,12 +104,14 @@ class Tile:
 
     @cached_property
     def rest(self) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
-        """What was dropped, too small to be an entry: coefficients (n, 3), and each patch's weight
-        (K, 3) in the light that they go with; None in a field without."""
+        """What was too small to be an entry: coefficients (n, 3) of all that a pixel has under the
+        code `REST`, and each patch's weight (K,) among them; None in a field without."""
         if not (self.folder / "rest.npy").is_file():
             return None
-        rest = self._load("rest", (self.region.pixels, 3))
-        return rest.astype(np.float32), np.asarray(self._load("rest_weights", (self.patches, 3)))
+        return (
+            np.asarray(self._load("rest", (self.region.pixels, 3))),
+            np.asarray(self._load("rest_weights", (self.patches,))),
+        )
 
     def open(self) -> None:
         """Map all that `entries` needs. Raises FieldError."""

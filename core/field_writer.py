@@ -15,7 +15,7 @@ from .field import HEADER, VERSION
 from .files import PART, replace_folder
 from .hemicube import Hemicube
 from .region import Region
-from .supports import BY_CODE, NOTHING
+from .supports import BY_CODE, NOTHING, REST
 
 # A patch's brightest coefficient in its units: under the largest half float.
 LARGEST = 6e4
@@ -30,29 +30,45 @@ class TileWriter:
         self.codes: list[NDArray] = []
         self.scales: list[float] = []
         self.parts: dict[int, tuple[list[NDArray], list[NDArray]]] = {}
-        # what was dropped: by pixel, and by patch
+        # what was dropped: by pixel and channel, and by patch
         self.rest: NDArray[np.float64] = np.zeros((region.pixels, 3))
-        self.rest_of: list[NDArray] = []
+        self.rest_of: list[float] = []
 
     def add(self, codes: NDArray, coefficient: NDArray, parameters: dict[int, NDArray]) -> None:
-        """The next patch: model code (n,), R (n, 3), and each used code's parameters (m, p)."""
+        """The next patch: model code (n,), R (n, 3), and each used code's parameters (m, p).
+
+        Light without an entry is added to the pixel's rest. A coefficient below 0, which only
+        patterns that do not fit together can give, is no light. Raises FieldError for one that is
+        no number.
+        """
+        self._check(coefficient)
+        coefficient = np.maximum(coefficient, 0)
         # half floats are relative to the patch's brightest, so that any exposure fits them; that is
         # at their upper end, so that a firefly leaves nine decades below it their precision
         scale = float(coefficient.max(initial=0)) / LARGEST or 1.0
-        if not np.isfinite(scale):
-            raise FieldError(
-                f"patch {len(self.codes)} has coefficients that are infinite or not a number: "
-                "repair the basis images, or capture again"
-            )
-        dropped = coefficient * (codes == NOTHING)[:, None]
-        self.rest += dropped
-        self.rest_of.append(dropped.sum(axis=0, dtype=np.float64))
+        dropped = np.flatnonzero((codes == NOTHING) & coefficient.any(axis=-1))
+        codes = codes.copy()
+        codes[dropped] = REST
+        self.rest[dropped] += coefficient[dropped]
+        self.rest_of.append(float(coefficient[dropped].sum(dtype=np.float64)))
         self.codes.append(codes)
         self.scales.append(scale)
         for code, values in parameters.items():
             r, p = self.parts.setdefault(code, ([], []))
             r.append((coefficient[codes == code] / scale).astype(np.float16))
             p.append(np.rint(np.clip(values, 0, 1) * 65535).astype(np.uint16))
+
+    def _check(self, coefficient: NDArray) -> None:
+        # one pass that NaN fails too
+        if -np.inf < coefficient.min(initial=0) and coefficient.max(initial=0) < np.inf:
+            return
+        bad = np.flatnonzero(~np.isfinite(coefficient).all(axis=-1))
+        row, column = divmod(int(bad[0]), self.region.width)
+        raise FieldError(
+            f"patch {len(self.codes)} has reflection coefficients that are infinite or not a "
+            f"number in {len(bad)} pixels, the first at ({self.region.x + column}, "
+            f"{self.region.y + row}): repair the basis images there, or capture again"
+        )
 
     def write(self, folder: Path) -> dict[str, int]:
         """Write the arrays; returns how many entries each model took."""
@@ -67,10 +83,10 @@ class TileWriter:
             np.save(folder / f"{name}_parameters.npy", np.concatenate(p))
             used[name] = sum(map(len, r))
         if self.rest.any():
-            scale = self.rest.max() / LARGEST
-            np.save(folder / "rest.npy", (self.rest / scale).astype(np.float16))
-            weights = np.stack(self.rest_of)
-            weights *= scale / np.maximum(weights.sum(axis=0), 1e-300)
+            np.save(folder / "rest.npy", self.rest.astype(np.float32))
+            # relative to the largest: only their ratios count, and none that is one may vanish
+            weights = np.array(self.rest_of) / max(self.rest_of)
+            weights = np.where(weights > 0, np.maximum(weights, 1e-30), 0)
             np.save(folder / "rest_weights.npy", weights.astype(np.float32))
         for name, pixels in self.layers.items():
             dtype = np.float32 if name in ("own", "depth") else np.float16

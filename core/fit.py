@@ -8,30 +8,30 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from . import choice as choices
 from .capture_set import CaptureSet, TileData
 from .evidence import evidence
 from .field_writer import FieldWriter, TileWriter
+from .hemicube import Hemicube
 from .moments import Moments, channel_sum
 from .patterns import PatternSet
-from .search import in_solid_angle, search
+from .search import search
 from .supports import BOX, WHOLE
 
 
 def fit_tile(
     data: TileData,
     patterns: PatternSet,
+    hemicube: Hemicube,
     choice: str,
     samples: float | None = None,
     separate: bool = False,
-    extents: NDArray | None = None,
 ) -> Iterator[float | TileWriter]:
     """Fit one tile: yields the share that is done, and last the tile, ready to be written.
 
     samples: samples a pixel of the capture, which tell how far its noise can be believed (None: no
-    noise); separate: a support for each channel; extents: (K, 4), `Hemicube.extents`.
+    noise); separate: a support for each channel.
     """
     layers = {"own": data.own, "alpha": data.alpha, **data.guides}
     writer = TileWriter(data.region, layers)
@@ -39,31 +39,32 @@ def fit_tile(
     images = data.basis.reshape(patches, len(patterns), -1, 3)
     coefficients = patterns.coefficient(np.moveaxis(images, 1, 0))
     shape = (data.region.height, data.region.width)
-    known = evidence(coefficients, shape, samples, data.grain, extents)
+    known = evidence(coefficients, shape, hemicube.solid_angles, samples, data.grain)
     brightest = None
     if choice == choices.STAGE_AND_MATTE:
         brightest = channel_sum(coefficients).argmax(axis=0)
     for k in range(patches):
+        extent = hemicube.extent(k)
         if choice == choices.SEARCH:
-            codes, _ = choices.choose("whole", images[k], coefficients[k], patterns, known, k)
-            boxes = in_solid_angle(search(images[k], patterns, data.region.height), known.extent(k))
+            codes, _ = choices.choose(
+                "whole", images[k], coefficients[k], patterns, known, k, extent
+            )
+            boxes = search(images[k], patterns, extent, data.region.height)
             parameters = {BOX.code: boxes[codes == WHOLE.code]}
             codes[codes == WHOLE.code] = BOX.code
         elif brightest is not None:
             # the straightforward combination: a Light Stage, and one matte where it is brightest
-            codes, _ = choices.choose("whole", images[k], coefficients[k], patterns, known, k)
+            codes, _ = choices.choose(
+                "whole", images[k], coefficients[k], patterns, known, k, extent
+            )
             codes[(brightest == k) & (codes == WHOLE.code)] = BOX.code
             parameters = {
-                s.code: s.fit(
-                    Moments.from_basis(
-                        images[k][:, codes == s.code], patterns, extent=known.extent(k)
-                    )
-                )
+                s.code: s.fit(Moments.from_basis(images[k][:, codes == s.code], patterns, extent))
                 for s in (WHOLE, BOX)
             }
         else:
             codes, parameters = choices.choose(
-                choice, images[k], coefficients[k], patterns, known, k, separate
+                choice, images[k], coefficients[k], patterns, known, k, extent, separate
             )
         writer.add(codes, coefficients[k], parameters)
         yield (k + 1) / patches
@@ -85,7 +86,6 @@ def fit(
     """
     choices.check(choice, captured.patterns, separate)
     samples = captured.samples
-    patterns, extents = captured.patterns, captured.hemicube.extents
     begun = time.perf_counter()
     reading = 0.0
     keep = ("scene", "colour_space", "samples", "file", "frame", "view_layer", "far", "key")
@@ -101,7 +101,9 @@ def fit(
             start = time.perf_counter()
             data = captured.read(tile)
             reading += time.perf_counter() - start
-            for step in fit_tile(data, patterns, choice, samples, separate, extents):
+            for step in fit_tile(
+                data, captured.patterns, captured.hemicube, choice, samples, separate
+            ):
                 if isinstance(step, TileWriter):
                     writer.add(step)
                 else:

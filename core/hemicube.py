@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import HemicubeError
-from .measure import uniform_moments
+from .measure import Extent, uniform_moments
 
 # name -> (centre, direction of u, direction of v); seen from inside, v is up on the four sides.
 FACES: dict[str, tuple[tuple[int, int, int], ...]] = {
@@ -258,9 +258,15 @@ class Hemicube:
 
         return corner(x1, y1) - corner(x0, y1) - corner(x1, y0) + corner(x0, y0)
 
+    def extent(self, k: int) -> Extent:
+        """x0, x1, y0, y1 of patch k on its face: a row of `extents`, to measure its light by."""
+        x0, x1, y0, y1 = (float(x) for x in self.extents[k])
+        return x0, x1, y0, y1
+
     def uniform_moments(self, k: int) -> NDArray[np.float64]:
-        """(6,): the normalised moments of a transport uniform in solid angle over patch k."""
-        return uniform_moments(self.extents[k])
+        """(6,) moments, over the zeroth, of a transport that sees all of patch k evenly by solid
+        angle, in the order of `patterns.MONOMIALS`: a light path's measure, not the face's area."""
+        return uniform_moments(self.extent(k))
 
     @property
     def closed(self) -> bool:

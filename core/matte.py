@@ -39,7 +39,7 @@ def fit(basis: NDArray, patterns: PatternSet, hemicube: Hemicube) -> Matte:
     direction = np.zeros((n, 3))
     weight = np.zeros(n)
     for k in range(len(hemicube)):
-        m = Moments.from_basis(basis[k], patterns)
+        m = Moments.from_basis(basis[k], patterns, hemicube.extent(k))
         w = m.coefficient.sum(axis=-1, dtype=np.float64)
         coefficient += m.coefficient
         direction += w[:, None] * hemicube.directions(k, *m.mean)

@@ -2,7 +2,8 @@
 
 For the transport T(u, v) from a patch to a pixel, moment m is the integral of T times the m-th of
 `patterns.MONOMIALS`. The zeroth is the reflection coefficient R (paper 3); the others over it are
-the mean place on the patch that the pixel sees, and its spread.
+the mean place on the patch that the pixel sees, and its spread. T has the solid angle in it: a
+patch that is seen evenly has the moments `Moments.uniform`, which are not those of its area.
 """
 
 from __future__ import annotations
@@ -13,10 +14,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from .measure import Extent, uniform_moments
 from .patterns import ONE, UU, UV, VV, PatternSet, U, V
-
-# Of a transport uniform in area.
-UNIFORM_VARIANCE = 1 / 12
 
 
 @dataclass(frozen=True)
@@ -25,27 +24,24 @@ class Moments:
 
     coefficient: (n, 3) reflection coefficient R per channel. normalised: (6, n) moments shared by
     the channels, over the zeroth; NaN where the patterns cannot tell. A pixel without light from
-    the patch has those of the whole patch. channels: the same for red, green and blue by
-    themselves, where they were asked for. extent: where the patch is on its face
-    (`Hemicube.extents`), None where its light is uniform in area (`measure`).
+    the patch has those of the whole patch. extent: where the patch is on its face, which says what
+    its solid angle is. channels: the same for red, green and blue by themselves, where they were
+    asked for.
     """
 
     coefficient: NDArray
     normalised: NDArray
+    extent: Extent
     channels: tuple[Moments, ...] = ()
-    extent: NDArray | None = None
 
     @staticmethod
     def from_basis(
-        basis: NDArray,
-        patterns: PatternSet,
-        per_channel: bool = False,
-        extent: NDArray | None = None,
+        basis: NDArray, patterns: PatternSet, extent: Extent, per_channel: bool = False
     ) -> Moments:
         """basis: (P, n, 3) -> the moments. The channels share a support, as in the paper (5).
 
-        per_channel: also the moments of each channel by itself, in `channels`; extent: of the
-        patch.
+        extent: of the patch, see `Hemicube.extent`; per_channel: also the moments of each channel
+        by itself, in `channels`.
         """
         # float64: a narrow support is a small difference of large moments
         shared = patterns.moments(channel_sum(basis))
@@ -53,17 +49,22 @@ class Moments:
         channels: tuple[Moments, ...] = ()
         if per_channel:
             each = (patterns.moments(basis[..., c].astype(np.float64)) for c in range(3))
-            channels = tuple(Moments(coefficient, normalise(m), extent=extent) for m in each)
-        return Moments(coefficient, normalise(shared), channels, extent)
+            channels = tuple(Moments(coefficient, normalise(m, extent), extent) for m in each)
+        return Moments(coefficient, normalise(shared, extent), extent, channels)
 
     def select(self, pixels: NDArray) -> Moments:
         """The moments of some of the pixels (a mask or indices)."""
         return Moments(
             self.coefficient[pixels],
             self.normalised[:, pixels],
-            tuple(c.select(pixels) for c in self.channels),
             self.extent,
+            tuple(c.select(pixels) for c in self.channels),
         )
+
+    @property
+    def uniform(self) -> NDArray[np.float64]:
+        """(6,) normalised moments of a pixel that sees the whole patch evenly."""
+        return uniform_moments(self.extent)
 
     @cached_property
     def mean(self) -> tuple[NDArray, NDArray]:
@@ -91,13 +92,14 @@ def channel_sum(images: NDArray) -> NDArray[np.float64]:
     return images[..., 0].astype(np.float64) + images[..., 1] + images[..., 2]
 
 
-def normalise(moments: NDArray) -> NDArray:
-    """(6, n) moments over the zeroth, held inside what any transport on [0, 1]^2 can have."""
+def normalise(moments: NDArray, extent: Extent) -> NDArray:
+    """(6, n) moments over the zeroth, held inside what any transport on [0, 1]^2 can have; those of
+    the whole patch where there is no light."""
     total = moments[ONE]
     # what is not a number is no evidence of a support either
     lit = (total > 0) & np.isfinite(moments[[ONE, U, V]]).all(axis=0)
     out = moments / np.where(lit, total, 1)
-    out[:, ~lit] = np.array([1, 1 / 2, 1 / 3, 1 / 2, 1 / 3, 1 / 4])[:, None]
+    out[:, ~lit] = uniform_moments(extent)[:, None]
     out[[U, V]] = np.clip(out[[U, V]], 0, 1)
     for mean, square in ((U, UU), (V, VV)):
         # 0 <= u <= 1, so E[u]^2 <= E[u^2] <= E[u]

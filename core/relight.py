@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .field import Field, Tile
 from .light import PatchLight
+from .supports import REST
 
 # Patches are added up in so many sums, each in a thread. As many on every machine: the order of a
 # sum is in its last digits, and the same field gives the same picture everywhere.
@@ -35,15 +36,24 @@ def relight(field: Field, light: PatchLight, own: float = 1.0) -> NDArray[np.flo
 def _light(tile: Tile, light: PatchLight) -> NDArray[np.float32]:
     """The light of all patches on the pixels of a tile -> (n, 3)."""
     tile.open()  # which may fail: here, and not in the threads
+    rest = tile.rest
+    weights = np.zeros(tile.patches) if rest is None else rest[1]
+    # of each patch in the rest: its weight times its mean radiance, and its weight
+    weighted = weights[:, None] * np.append(light.whole, np.ones((tile.patches, 1)), axis=1)
 
     def some(first: int) -> NDArray[np.float32]:
         # channel by channel: numpy is three times as fast at adding into a row as into columns
-        out = np.zeros((3, tile.region.pixels), np.float32)
+        out = np.zeros((7, tile.region.pixels), np.float32)
         for k in range(first, tile.patches, SUMS):
+            if weights[k]:
+                # times 0 or 1: numpy is slow at adding only where a mask is
+                here = (tile.codes[k] == REST).astype(np.float32)
+                for row, value in zip(out[3:], weighted[k].astype(np.float32), strict=True):
+                    row += here * value
             for e in tile.entries(k):
                 radiance = e.support.average(light, k, e.parameters)
                 light_of = e.coefficient * radiance.astype(np.float32, copy=False)
-                for channel, values in zip(out, light_of.T, strict=True):
+                for channel, values in zip(out[:3], light_of.T, strict=True):
                     channel[e.pixels] += values
         return out
 
@@ -51,12 +61,13 @@ def _light(tile: Tile, light: PatchLight) -> NDArray[np.float32]:
         total, *others = pool.map(some, range(SUMS))
     for other in others:
         total += other
-    if tile.rest:
-        coefficient, weights = tile.rest
-        # the mean of the dropped patches' light, each as much as was dropped of it in this tile:
-        # what a tile loses or gains by that adds up to nothing, in each channel
-        total += coefficient.T * (light.whole * weights).sum(axis=0).astype(np.float32)[:, None]
-    return total.T
+    picture, dropped, weight = total[:3], total[3:6], total[6]
+    if rest is not None:
+        # the mean radiance of the patches that were dropped there, each counting as much as was
+        # dropped of it in all the tile
+        np.divide(dropped, weight, out=dropped, where=weight > 0)
+        picture += rest[0].T * dropped
+    return picture.T
 
 
 def over(plate: NDArray, background: NDArray) -> NDArray[np.float32]:

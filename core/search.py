@@ -4,8 +4,8 @@ From an initial support all expansions are tried, the best is taken while it low
 then the step is halved, down to `finest`. What differs from the paper's text, and why:
 
 - Contractions are tried as well: a search that starts from the whole patch has nowhere to expand.
-- The patterns are polynomials, so their average over a box is known in closed form; a summed-area
-  table would be the same numbers on a grid.
+- The patterns are polynomials, so their average over a box, by solid angle, is a short sum; a
+  summed-area table would be the same numbers on a grid.
 - The initial support is the previous pixel's where the coefficients are nearly equal, which forces
   an order along a row. Rows do not depend on each other, so all rows advance together.
 """
@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .measure import box_of
+from .measure import Extent, box_averages
 from .patterns import PatternSet
 
 # The previous pixel's support is taken up where the coefficients differ by less than this share.
@@ -33,36 +33,21 @@ _MOVES = np.array(
 )  # fmt: skip
 
 
-def box_averages(boxes: NDArray) -> NDArray[np.float64]:
-    """Averages of the six monomials over boxes (u0, u1, v0, v1): (..., 4) -> (6, ...)."""
-    u0, u1, v0, v1 = np.moveaxis(boxes, -1, 0)
-    mu, mv = (u0 + u1) / 2, (v0 + v1) / 2
-    return np.stack(
-        [
-            np.ones_like(mu),
-            mu,
-            (u0 * u0 + u0 * u1 + u1 * u1) / 3,
-            mv,
-            (v0 * v0 + v0 * v1 + v1 * v1) / 3,
-            mu * mv,
-        ]
-    )
-
-
-def _error(boxes: NDArray, patterns: PatternSet, target: NDArray) -> NDArray:
+def _error(boxes: NDArray, patterns: PatternSet, extent: Extent, target: NDArray) -> NDArray:
     """The paper's squared error over patterns and channels, over sum R^2 and less a constant.
 
     With one support for all channels, sum_c (R_c a - I_c)^2 is sum_c R_c^2 times (a - t)^2 and what
     no support can mend, with the target t = sum R I / sum R^2: written so, nothing cancels.
     boxes: (m, n, 4); target: (P, n) -> (m, n).
     """
-    averages = np.tensordot(patterns.matrix, box_averages(boxes), axes=1)
+    averages = np.tensordot(patterns.matrix, box_averages(boxes, extent), axes=1)
     return np.square(averages - target[:, None]).sum(axis=0)
 
 
 def descend(
     boxes: NDArray,
     patterns: PatternSet,
+    extent: Extent,
     target: NDArray,
     coarsest: float,
     finest: float,
@@ -72,11 +57,11 @@ def descend(
     step = coarsest
     while step >= finest:
         active = np.arange(len(boxes))
-        best = _error(boxes[None], patterns, target)[0]
+        best = _error(boxes[None], patterns, extent, target)[0]
         while len(active):
             trial = np.clip(boxes[None, active] + step * _MOVES[:, None], 0, 1)
             proper = (trial[..., 1] >= trial[..., 0]) & (trial[..., 3] >= trial[..., 2])
-            errors = _error(trial, patterns, target[:, active])
+            errors = _error(trial, patterns, extent, target[:, active])
             errors[~proper] = np.inf
             choice = errors.argmin(axis=0)
             least = errors[choice, np.arange(len(active))]
@@ -92,16 +77,17 @@ def descend(
 def search(
     basis: NDArray,
     patterns: PatternSet,
+    extent: Extent,
     height: int,
     finest: float = 1 / 256,
     follow: bool = True,
 ) -> NDArray[np.float64]:
     """Algorithm 1 for one patch of a picture.
 
-    basis: (P, n, 3) of n = height x width pixels, row by row; finest: the last step, in patch
-    widths; follow: start from the previous pixel where coefficients are nearly equal (the paper's
-    rule; without it every pixel starts from the whole patch and all are searched at once).
-    -> boxes (n, 4) as u0, u1, v0, v1.
+    basis: (P, n, 3) of n = height x width pixels, row by row; extent: of the patch on its face;
+    finest: the last step, in patch widths; follow: start from the previous pixel where coefficients
+    are nearly equal (the paper's rule; without it every pixel starts from the whole patch and all
+    are searched at once). -> boxes (n, 4) as u0, u1, v0, v1.
     """
     images = basis.astype(np.float64)
     r = patterns.coefficient(images)
@@ -109,7 +95,7 @@ def search(
     target = np.einsum("nc,pnc->pn", r, images) / np.where(rr > 0, rr, 1)
     whole = np.tile(np.array([0.0, 1.0, 0.0, 1.0]), (len(rr), 1))
     if not follow:
-        return descend(whole, patterns, target, COARSEST, finest)
+        return descend(whole, patterns, extent, target, COARSEST, finest)
     width = len(rr) // height
     out = whole.reshape(height, width, 4)
     targets = target.reshape(-1, height, width)
@@ -119,14 +105,5 @@ def search(
         if x:
             near = np.abs(size[:, x] - size[:, x - 1]) <= NEARLY_EQUAL * size[:, x - 1]
             start[near] = out[near, x - 1]
-        out[:, x] = descend(start, patterns, targets[:, :, x], COARSEST, finest)
+        out[:, x] = descend(start, patterns, extent, targets[:, :, x], COARSEST, finest)
     return out.reshape(-1, 4)
-
-
-def in_solid_angle(boxes: NDArray, extent: NDArray | None) -> NDArray[np.float64]:
-    """Boxes (n, 4) found with the patterns averaged by area, as boxes of the same moments in the
-    measure that the light is averaged in. extent: of the patch, None: as they are."""
-    u0, u1, v0, v1 = boxes.T
-    mean = ((u0 + u1) / 2, (v0 + v1) / 2)
-    variance = ((u1 - u0) ** 2 / 12, (v1 - v0) ** 2 / 12)
-    return box_of(mean, variance, extent)

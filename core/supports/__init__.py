@@ -17,6 +17,17 @@ SUPPORTS: dict[str, Support] = {
 }
 PER_CHANNEL: dict[str, Support] = {s.name: PerChannel(s) for s in SUPPORTS.values() if s.parameters}
 BY_CODE: dict[int, Support] = {s.code: s for s in (*SUPPORTS.values(), *PER_CHANNEL.values())}
-NOTHING = 0
+# Codes that are no model: no light, and light too small to be an entry, which is in the rest.
+NOTHING, REST = 0, 255
 
-__all__ = ["BOX", "BY_CODE", "LINEAR", "NOTHING", "PER_CHANNEL", "SUPPORTS", "WHOLE", "Support"]
+__all__ = [
+    "BOX",
+    "BY_CODE",
+    "LINEAR",
+    "NOTHING",
+    "PER_CHANNEL",
+    "REST",
+    "SUPPORTS",
+    "WHOLE",
+    "Support",
+]

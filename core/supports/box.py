@@ -1,8 +1,8 @@
-"""The box: an axis-aligned rectangle, uniform inside (paper 3 and 5), in closed form.
+"""The box: an axis-aligned rectangle, uniform inside (paper 3 and 5), from its moments.
 
-A box uniform in area, of centre mu and half width a, has E[u] = mu and E[u^2] = mu^2 + a^2 / 3: the
-paper's search finds the same minimum where its patterns can see it. Uniform in solid angle, as the
-light is averaged over it, it is a little elsewhere: `measure.box_of`.
+A uniform box of centre mu and half width a has E[u] = mu and E[u^2] = mu^2 + a^2 / 3, where its
+patch is so small that area and solid angle are one; `measure.box_of` finds the box on any. The
+paper's search finds the same minimum where its patterns can see it.
 """
 
 from __future__ import annotations

@@ -1,10 +1,15 @@
 """Two components in one patch: a uniform one (the base) and a narrow box (the coat).
 
-With share x of the light in the box, the deviation of the mean from the patch's centre is x times
-that of the box's centre, and the covariance of u and v is (1 - x) x times the product of the box
-centre's deviations. So x = 1 / (1 + C / (d_u d_v)), and the box follows from what is left of the
-second moments. A box on either middle line of the patch has C = 0 and d = 0 there: five numbers
-from four then, and the single box is what comes out (docs/identifiability.md).
+With share x of the light in the box, the deviation of the mean from the whole patch's is x times
+that of the box's mean, and the covariance of u and v is
+
+    C = (1 - x) C_patch + x C_box + (1 - x) / x d_u d_v
+
+with d the deviations of the mean. A box has next to no covariance, so this is a quadratic equation
+in x (where area and solid angle are one, C_patch is 0 too, and x = 1 / (1 + C / (d_u d_v))); the
+box follows from what is left of the second moments, and its own covariance corrects x. A box on
+either middle line of the patch has d = 0 there: five numbers from four then, and the single box is
+what comes out (docs/identifiability.md).
 """
 
 from __future__ import annotations
@@ -13,9 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..light import PatchLight
+from ..measure import box_averages, box_of
 from ..moments import Moments
 from ..patterns import ONE, UU, UV, VV, U, V
 
+# Rounds of finding the box and taking its covariance from what the shares are told by.
+_STEPS = 4
 # Under this the product of the mean's deviations says nothing about the shares.
 _LEAST_DEVIATION = 1e-4
 
@@ -27,23 +35,45 @@ class Double:
     needs: tuple[int, ...] = (ONE, U, UU, V, VV, UV)
 
     def fit(self, moments: Moments) -> NDArray:
-        (mu, mv), covariance = moments.mean, moments.covariance
-        du, dv = mu - 0.5, mv - 0.5
-        product = du * dv
-        tells = np.abs(product) > _LEAST_DEVIATION
-        ratio = np.where(tells, covariance / np.where(tells, product, 1), 0)
-        share = 1 / (1 + np.maximum(ratio, 0))
-        # the box's centre must be on the patch
-        share = np.clip(np.maximum(share, 2 * np.maximum(np.abs(du), np.abs(dv))), 1e-6, 1)
-        edges = []
-        for d, square in ((du, moments.normalised[UU]), (dv, moments.normalised[VV])):
-            centre = 0.5 + d / share
-            own = (square - (1 - share) / 3) / share
-            half = np.sqrt(3 * np.maximum(own - centre * centre, 0))
-            edges += [centre - half, centre + half]
-        return np.clip(np.stack([share, *edges], axis=-1), 0, 1)
+        even, covariance = moments.uniform, moments.covariance
+        du, dv = (mean - even[m] for mean, m in zip(moments.mean, (U, V), strict=True))
+        share, boxes = np.ones(len(du)), np.empty((len(du), 4))
+        own = np.zeros(len(du))
+        for _ in range(_STEPS):
+            share = _share(du * dv, covariance - share * own, even[UV] - even[U] * even[V])
+            for d, m, square in ((du, U, UU), (dv, V, VV)):
+                # the box's mean must be on the patch, and its variance not below 0
+                share = np.maximum(share, np.where(d > 0, d / (1 - even[m]), -d / even[m]))
+                half = (moments.normalised[square] - even[square]) / 2 - even[m] * d
+                spread = even[square] - even[m] ** 2
+                root = np.sqrt(half * half + spread * d * d)
+                share = np.maximum(share, (root - half) / spread)
+            share = np.clip(share, 1e-6, 1)
+            means, variances = [], []
+            for d, m, square in ((du, U, UU), (dv, V, VV)):
+                mean = even[m] + d / share
+                left = (moments.normalised[square] - (1 - share) * even[square]) / share
+                means.append(mean)
+                variances.append(np.maximum(left - mean * mean, 0))
+            boxes = box_of((means[0], means[1]), (variances[0], variances[1]), moments.extent)
+            averages = box_averages(boxes, moments.extent)
+            own = averages[UV] - averages[U] * averages[V]
+        return np.clip(np.concatenate([share[:, None], boxes], axis=-1), 0, 1)
 
     def average(self, light: PatchLight, k: int, parameters: NDArray) -> NDArray:
         share, u0, u1, v0, v1 = parameters.astype(np.float64).T
         share = share[:, None]
         return share * light.box(k, u0, u1, v0, v1) + (1 - share) * light.whole[k]
+
+
+def _share(product: NDArray, covariance: NDArray, base: float) -> NDArray:
+    """The share x in covariance = (1 - x) (base + product / x): 1 where nothing tells it.
+
+    product: of the mean's deviations; base: the whole patch's covariance.
+    """
+    tells = np.abs(product) > _LEAST_DEVIATION
+    size, sign = np.abs(product), np.sign(product)
+    # base x^2 + (covariance - base + product) x - product = 0, by the root that stays with base = 0
+    linear = np.maximum(sign * covariance, 0) - sign * base + size
+    root = np.sqrt(np.maximum(linear * linear + 4 * sign * base * size, 0))
+    return np.where(tells, 2 * size / np.where(tells, linear + root, 1), 1)

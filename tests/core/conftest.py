@@ -15,7 +15,7 @@ from arto.core import capture_set, exr, fit
 from arto.core.environment import Environment
 from arto.core.field import Field
 from arto.core.hemicube import Hemicube
-from arto.core.patterns import PatternSet, pattern_set
+from arto.core.patterns import PatternSet, monomials, pattern_set
 from arto.core.region import Region
 from hypothesis import settings
 from numpy.typing import NDArray
@@ -33,36 +33,46 @@ def _rotation(seed: int) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(float(x) for x in row) for row in q)
 
 
-def _planted(patterns: PatternSet, boxes: NDArray, coefficient: NDArray) -> NDArray:
-    """Basis images (P, n, 3) of uniform boxes (n, 4: u0, u1, v0, v1) with R (n, 3): the integral
-    of each pattern's polynomial over the box, written out."""
+# A patch so small that its area and its solid angle are one: boxes have their moments written out.
+FLAT = (-1e-6, 1e-6, -1e-6, 1e-6)
+
+
+def _box_moments(boxes: NDArray, extent: tuple[float, ...] = FLAT) -> NDArray:
+    """Moments (6, n) over the zeroth of transports that see boxes (n, 4: u0, u1, v0, v1) of a patch
+    evenly by solid angle. On a flat patch the integrals written out; else a sum over 24 x 24 places
+    of each box, weighted by how a face at distance 1 is foreshortened and far there."""
     u0, u1, v0, v1 = np.asarray(boxes, np.float64).T
-    moments = np.stack(
-        [
-            np.ones_like(u0),
-            (u0 + u1) / 2,
-            (u0 * u0 + u0 * u1 + u1 * u1) / 3,
-            (v0 + v1) / 2,
-            (v0 * v0 + v0 * v1 + v1 * v1) / 3,
-            (u0 + u1) * (v0 + v1) / 4,
-        ]
-    )
-    return (patterns.matrix @ moments)[..., None] * coefficient
+    if extent == FLAT:
+        return np.stack(
+            [
+                np.ones_like(u0),
+                (u0 + u1) / 2,
+                (u0 * u0 + u0 * u1 + u1 * u1) / 3,
+                (v0 + v1) / 2,
+                (v0 * v0 + v0 * v1 + v1 * v1) / 3,
+                (u0 + u1) * (v0 + v1) / 4,
+            ]
+        )
+    at, weight = np.polynomial.legendre.leggauss(24)
+    at = (at + 1) / 2
+    u, v = u0 + (u1 - u0) * at[:, None, None], v0 + (v1 - v0) * at[:, None]
+    x0, x1, y0, y1 = extent
+    x, y = x0 + (x1 - x0) * u, y0 + (y1 - y0) * v
+    distance = np.sqrt(x * x + y * y + 1)
+    # the cosine to the face's normal is 1 / distance
+    solid_angle = weight[:, None, None] * weight[:, None] / distance / distance**2
+    m = (monomials(u, v) * solid_angle).sum(axis=(1, 2))
+    return m / m[0]
 
 
-def _seen(patterns: PatternSet, boxes: NDArray, coefficient: NDArray, extent: NDArray) -> NDArray:
-    """`_planted` as a scene sees it: uniform in solid angle over boxes of a patch on a face."""
-    nodes, weights = np.polynomial.legendre.leggauss(16)
-    t = (nodes + 1) / 2
-    u0, u1, v0, v1 = boxes.T
-    u = (u0[:, None] + (u1 - u0)[:, None] * t)[:, :, None]
-    v = (v0[:, None] + (v1 - v0)[:, None] * t)[:, None, :]
-    x = extent[0] + (extent[1] - extent[0]) * u
-    y = extent[2] + (extent[3] - extent[2]) * v
-    weight = (1 + x * x + y * y) ** -1.5 * np.outer(weights, weights)
-    images = patterns.radiance(*np.broadcast_arrays(u, v))
-    found = (images * weight).sum(axis=(2, 3)) / weight.sum(axis=(1, 2))
-    return found[..., None] * coefficient
+def _planted(
+    patterns: PatternSet,
+    boxes: NDArray,
+    coefficient: NDArray,
+    extent: tuple[float, ...] = FLAT,
+) -> NDArray:
+    """Basis images (P, n, 3) of even boxes (n, 4: u0, u1, v0, v1) with R (n, 3)."""
+    return (patterns.matrix @ _box_moments(boxes, extent))[..., None] * coefficient
 
 
 def _hits(patterns: PatternSet, u: NDArray, v: NDArray, weights: NDArray) -> NDArray:
@@ -136,8 +146,8 @@ def _scene(
     chosen = pattern_set(patterns)
     basis = np.stack(
         [
-            _seen(chosen, b.reshape(-1, 4), r.reshape(-1, 3), extent)
-            for b, r, extent in zip(boxes, coefficient, hemicube.extents, strict=True)
+            _planted(chosen, b.reshape(-1, 4), c.reshape(-1, 3), hemicube.extent(n))
+            for n, (b, c) in enumerate(zip(boxes, coefficient, strict=True))
         ]
     )
     basis = basis.reshape(k, len(chosen), *shape, 3).astype(np.float32)
@@ -186,8 +196,15 @@ def _helper(function: Callable) -> Callable:
     return pytest.fixture(scope="session", name=function.__name__.lstrip("_"))(lambda: function)
 
 
+@pytest.fixture(scope="session")
+def flat() -> tuple[float, ...]:
+    """The extent of a patch so small that its area and its solid angle are one."""
+    return FLAT
+
+
 rotation = _helper(_rotation)
 planted = _helper(_planted)
+box_moments = _helper(_box_moments)
 hits = _helper(_hits)
 smooth = _helper(_smooth)
 texel_directions = _helper(_texel_directions)

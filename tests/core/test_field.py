@@ -12,15 +12,17 @@ import numpy as np
 import pytest
 from arto.core import fit
 from arto.core.capture_set import CaptureSet
+from arto.core.environment import Environment
 from arto.core.errors import CaptureSetError, FieldError, PatternError
 from arto.core.evidence import DROPPED
 from arto.core.field import HEADER, VERSION, Field
 from arto.core.field_writer import FieldWriter, TileWriter
 from arto.core.hemicube import Hemicube
+from arto.core.light import PatchLight
 from arto.core.patterns import pattern_set
 from arto.core.region import Region
 from arto.core.relight import relight
-from arto.core.supports import BOX, LINEAR, NOTHING, WHOLE
+from arto.core.supports import BOX, LINEAR, NOTHING, REST, WHOLE
 
 CUBE = Hemicube(faces=("top", "back"), patches=2)
 
@@ -101,10 +103,13 @@ def test_models_side_by_side(tmp_path: Path) -> None:
     writer.add(tile)
     writer.close()
     field = Field(tmp_path / "field")
-    np.testing.assert_array_equal(field.tiles[0].codes, codes)
+    # all have light: where it is no entry, it is in the rest
+    np.testing.assert_array_equal(field.tiles[0].codes, np.where(codes == NOTHING, REST, codes))
+    rest = np.where((codes == NOTHING)[..., None], r, 0)
+    np.testing.assert_allclose(field.tiles[0].rest[0], rest.sum(axis=0), rtol=1e-6)
     for k in range(4):
         found = entries_of(field, k)
-        assert set(found) == set(np.flatnonzero(codes[k]).tolist())
+        assert set(found) == set(np.flatnonzero(codes[k] != NOTHING).tolist())
         for pixel, (coefficient, p) in found.items():
             np.testing.assert_allclose(coefficient, r[k, pixel], rtol=1e-3)
             np.testing.assert_allclose(p, parameters[k, pixel][: len(p)], atol=1e-5)
@@ -114,7 +119,7 @@ def test_models_side_by_side(tmp_path: Path) -> None:
     assert sum(field.shares().values()) == pytest.approx(1)
     counts = [(codes == c).sum() for c in (1, 2, 3)]
     data = counts[0] * 6 + counts[1] * (6 + 4) + counts[2] * (6 + 8) + 48 + 4 * 4
-    data += 12 * 6 + 4 * 12  # the rest of what was dropped, and whose it is
+    data += 12 * 12 + 4 * 4  # the rest of what was dropped, and whose it is
     headers = 128 * 10  # .npy, one each
     assert field.bytes_per_pixel() * 12 == data + headers
 
@@ -134,13 +139,13 @@ def test_a_patch_that_does_not_reach_a_material_takes_no_entry(
         dropped = 0
         if choice == "auto":  # drops what nobody would see
             size = basis[:, 0].sum(axis=-1)
-            dropped = (size[(codes == NOTHING) & (size > 0)]).size
-            assert size[codes == NOTHING].sum() < DROPPED * size.sum()
+            dropped = int((codes == REST).sum())
+            assert size[codes == REST].sum() < DROPPED * size.sum()
             assert dropped < 10
-        assert ((codes != NOTHING).sum() + dropped) == 8 * 48 / 2
+        assert (codes != NOTHING).sum() == 8 * 48 / 2
         assert (codes[:4, :, 4:] == NOTHING).all() and (codes[4:, :, :4] == NOTHING).all()
         assert field.shares()["nothing"] == pytest.approx(0.5 + dropped / 8 / 48)
-        assert sum(field.tiles[0].used.values()) == (codes != NOTHING).sum()
+        assert sum(field.tiles[0].used.values()) == (codes != NOTHING).sum() - dropped
 
 
 def test_opening_reads_no_arrays(tmp_path: Path, capture: Path, fitted, monkeypatch) -> None:
@@ -317,9 +322,6 @@ def refused(folder: Path, *says: str) -> None:
 
 
 def use(folder: Path) -> None:
-    from arto.core.environment import Environment
-    from arto.core.light import PatchLight
-
     field = Field(folder)
     relight(field, PatchLight(Environment.uniform(1.0, 16), field.hemicube))
 
@@ -403,11 +405,11 @@ def rest_field(folder: Path, coefficients: np.ndarray) -> Field:
     white = pattern_set("linear")
     k, n = coefficients.shape[:2]
     tile = TileWriter(Region(0, 0, n, 1), {"own": np.zeros((1, n, 3)), "alpha": np.ones((1, n))})
-    known = evidence(coefficients, (1, n), extents=cube.extents)
+    known = evidence(coefficients, (1, n), cube.solid_angles)
     uniform = [cube.uniform_moments(i)[[0, 1, 3]] for i in range(k)]
     for i in range(k):
         basis = uniform[i][:, None, None] * coefficients[i]
-        codes, parameters = choose("auto", basis, coefficients[i], white, known, i)
+        codes, parameters = choose("auto", basis, coefficients[i], white, known, i, cube.extent(i))
         tile.add(codes, coefficients[i], parameters)
     writer = FieldWriter(folder, cube, (1, n))
     writer.add(tile)
@@ -415,29 +417,104 @@ def rest_field(folder: Path, coefficients: np.ndarray) -> Field:
     return Field(folder)
 
 
-def test_what_is_dropped_is_kept_as_a_rest(tmp_path: Path) -> None:
-    """Under uniform light nothing is lost; under a sun in a dropped patch nothing of the tile."""
-    from arto.core.environment import Environment
-    from arto.core.light import PatchLight
+def sun_in(cube: Hemicube, k: int) -> np.ndarray:
+    """A black map, 64 high, with one texel of 1e5 in patch k."""
+    image = np.zeros((64, 128, 3), np.float32)
+    d = cube.directions(k, np.array(0.4), np.array(0.6))
+    row = int((0.5 - np.arcsin(d[2]) / np.pi) * 64)
+    column = int((0.5 - np.arctan2(d[1], d[0]) / (2 * np.pi)) * 128)
+    image[row, column] = 1e5
+    return image
 
+
+def test_what_is_dropped_is_kept_as_a_rest(tmp_path: Path) -> None:
+    """Under uniform light nothing is lost; under a sun in the one dropped patch nothing of it."""
     rng = np.random.default_rng(3)
     r = rng.uniform(0.5, 1, (6, 40, 3))
     r[2] *= 4e-4  # under a thousandth of each pixel, and dropped
     field = rest_field(tmp_path / "f", r)
-    assert (field.tiles[0].codes[2] == 0).all() and field.tiles[0].rest is not None
+    assert (field.tiles[0].codes[2] == REST).all() and field.tiles[0].rest is not None
     lit = relight(field, PatchLight(Environment.uniform(1.0), field.hemicube), own=0)[0, :, :3]
     np.testing.assert_allclose(lit, r.sum(axis=0), rtol=2**-11)
-    # a sun that only the dropped patch has
-    sun = np.zeros((64, 128, 3), np.float32)
-    d = field.hemicube.directions(2, np.array(0.4), np.array(0.6))
-    row = int((0.5 - np.arcsin(d[2]) / np.pi) * 64)
-    column = int((0.5 - np.arctan2(d[1], d[0]) / (2 * np.pi)) * 128)
-    sun[row, column] = 1e5
-    light = PatchLight(Environment(sun), field.hemicube)
+    light = PatchLight(Environment(sun_in(field.hemicube, 2)), field.hemicube)
     lit = relight(field, light, own=0)[0, :, :3]
-    expected = r[2] * light.whole[2]
-    np.testing.assert_allclose(lit.mean(axis=0), expected.mean(axis=0), rtol=1e-3)
-    np.testing.assert_allclose(lit, expected, rtol=2e-3)  # here no other patch was dropped
+    np.testing.assert_allclose(lit, r[2] * light.whole[2], rtol=1e-5)
+
+
+def test_the_rest_is_lit_by_what_was_dropped_there(tmp_path: Path) -> None:
+    """A sun in a patch without light in a pixel, or with an entry, is not in its rest; in one of
+    two that were dropped, the rest has its share of it, and never more than all its light."""
+    rng = np.random.default_rng(4)
+    r = rng.uniform(0.5, 1, (6, 40, 3))
+    r[2] *= 3e-4
+    r[3] *= 2e-4
+    r[2, :10] = 0
+    r[3, 10:20] = 0
+    field = rest_field(tmp_path / "f", r)
+    codes = field.tiles[0].codes
+    assert (codes[2, :10] == NOTHING).all() and (codes[2, 10:] == REST).all()
+
+    def lit(k: int) -> np.ndarray:
+        light = PatchLight(Environment(sun_in(field.hemicube, k)), field.hemicube)
+        return relight(field, light, own=0)[0, :, :3] / light.whole[k]
+
+    two, three, kept = lit(2), lit(3), lit(0)
+    assert not two[:10].any() and not three[10:20].any()
+    np.testing.assert_allclose(three[:10], r[3, :10], rtol=1e-5)
+    np.testing.assert_allclose(two[10:20], r[2, 10:20], rtol=1e-5)
+    np.testing.assert_allclose((two + three)[20:], (r[2] + r[3])[20:], rtol=1e-5)
+    weights = r[2:4].sum(axis=(1, 2))
+    np.testing.assert_allclose(two[20:], (r[2] + r[3])[20:] * weights[0] / weights.sum(), rtol=1e-5)
+    np.testing.assert_allclose(kept, r[0], rtol=2**-11 + 1e-6)
+
+
+def some_rest(folder: Path) -> Field:
+    """A field with light of patch 2 in the rest."""
+    r = np.random.default_rng(5).uniform(0.5, 1, (6, 40, 3))
+    r[2] *= 4e-4
+    return rest_field(folder, r)
+
+
+def test_a_field_of_before_there_was_a_rest_is_read(tmp_path: Path) -> None:
+    """Without the rest's arrays and code, as older fields are: all but what was dropped."""
+    field, folder = some_rest(tmp_path / "f"), tmp_path / "f" / "tile_0000"
+    white, rest = PatchLight(Environment.uniform(1.0), field.hemicube), field.tiles[0].rest
+    assert rest is not None and rest[0].all()
+    full = relight(field, white)
+    codes = np.load(folder / "codes.npy")
+    np.save(folder / "codes.npy", np.where(codes == REST, NOTHING, codes).astype(np.uint8))
+    (folder / "rest.npy").unlink()
+    (folder / "rest_weights.npy").unlink()
+    old = relight(Field(tmp_path / "f"), white)
+    np.testing.assert_allclose((full - old)[0, :, :3], rest[0], atol=2e-6)
+
+
+def test_the_rest_is_checked_as_the_other_arrays_are(tmp_path: Path) -> None:
+    some_rest(tmp_path / "f")
+    for name in ("rest", "rest_weights"):
+        path = tmp_path / "f" / "tile_0000" / f"{name}.npy"
+        right = np.load(path)
+        np.save(path, right[:-1])
+        refused(tmp_path / "f", f"{name}.npy")
+        np.save(path, right)
+    use(tmp_path / "f")
+    (tmp_path / "f" / "tile_0000" / "rest_weights.npy").unlink()
+    refused(tmp_path / "f", "rest_weights.npy is missing")
+
+
+def test_a_coefficient_below_nothing_is_no_light(tmp_path: Path) -> None:
+    """Patterns that do not fit together can give one; it takes no light from the pixel."""
+    r = np.array([[1.0, -0.1, 0.5], [-1e-3, -1e-3, -1e-3], [-0.5, 0.25, -0.5]])
+    tile = TileWriter(Region(0, 0, 3, 1), {"alpha": np.ones((1, 3))})
+    tile.add(np.array([1, 0, 0], np.uint8), r, {WHOLE.code: np.empty((1, 0))})
+    writer = FieldWriter(tmp_path / "f", Hemicube(faces=("top",), patches=1), (1, 3))
+    writer.add(tile)
+    writer.close()
+    field = Field(tmp_path / "f")
+    assert field.tiles[0].codes[0].tolist() == [WHOLE.code, NOTHING, REST]
+    np.testing.assert_allclose(entries_of(field, 0)[0][0], [1, 0, 0.5], rtol=1e-3)
+    assert field.tiles[0].rest is not None
+    np.testing.assert_array_equal(field.tiles[0].rest[0], [[0, 0, 0], [0, 0, 0], [0, 0.25, 0]])
 
 
 def test_a_firefly_leaves_the_others_their_precision(tmp_path: Path) -> None:
@@ -452,12 +529,15 @@ def test_a_firefly_leaves_the_others_their_precision(tmp_path: Path) -> None:
     np.testing.assert_allclose(got, r[0], rtol=2**-11 + 1e-6)
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf])
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_what_is_no_number_is_refused_with_its_place(tmp_path: Path, bad: float) -> None:
-    tile = TileWriter(Region(0, 0, 2, 1), {})
+    tile = TileWriter(Region(10, 20, 2, 1), {})
     good = np.ones((2, 3))
     tile.add(np.full(2, WHOLE.code, np.uint8), good, {WHOLE.code: np.empty((2, 0))})
     broken = good.copy()
     broken[1, 2] = bad
-    with pytest.raises(FieldError, match="patch 1 has coefficients that are infinite"):
+    with pytest.raises(
+        FieldError,
+        match=r"patch 1 has .* infinite or not a number in 1 pix.*, the first at \(11, 20\)",
+    ):
         tile.add(np.full(2, WHOLE.code, np.uint8), broken, {WHOLE.code: np.empty((2, 0))})

@@ -282,3 +282,45 @@ def test_the_grid_as_leaves_is_the_grid() -> None:
 def test_leaves_that_cannot_be(leaves, say: str) -> None:
     with pytest.raises(HemicubeError, match=say):
         Hemicube(leaves=leaves)
+
+
+@pytest.mark.parametrize(
+    "cube",
+    [
+        *(Hemicube(patches=n) for n in (1, 2, 4, 16)),
+        Hemicube(patches=3, half_sides=True),
+        Hemicube(leaves=(("top", 1, 0, 0), ("left", 2, 1, 0), ("back", 16, 3, 15))),
+    ],
+    ids=len,
+)
+def test_uniform_moments_are_the_integrals_of_solid_angle(cube: Hemicube) -> None:
+    """Written out: the integrals of 1, x, x^2, y, y^2, xy over (1 + x^2 + y^2)^(3/2), between the
+    corners of the patch, then in its coordinates."""
+
+    def primitives(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        r = np.sqrt(1 + x * x + y * y)
+        angle = np.arctan(x * y / r)
+        by_x, by_y = np.arcsinh(x / np.sqrt(1 + y * y)), np.arcsinh(y / np.sqrt(1 + x * x))
+        return np.stack([angle, -by_y, y * by_x - angle, -by_x, x * by_y - angle, -r])
+
+    for k in range(len(cube)):
+        x0, x1, y0, y1 = cube.extents[k]
+        total = primitives(x1, y1) - primitives(x0, y1) - primitives(x1, y0) + primitives(x0, y0)
+        assert total[0] == pytest.approx(cube.solid_angles[k])
+        one, x, xx, y, yy, xy = total / total[0]
+        a, b = x1 - x0, y1 - y0
+        expected = [
+            one,
+            (x - x0) / a,
+            (xx - 2 * x0 * x + x0 * x0) / a**2,
+            (y - y0) / b,
+            (yy - 2 * y0 * y + y0 * y0) / b**2,
+            (xy - x0 * y - y0 * x + x0 * y0) / (a * b),
+        ]
+        np.testing.assert_allclose(cube.uniform_moments(k), expected, atol=1e-10)
+
+
+def test_where_the_mean_of_a_corner_patch_is() -> None:
+    """Off its middle, towards the middle of the face."""
+    np.testing.assert_allclose(Hemicube(patches=2).uniform_moments(3)[[1, 3]], 0.426, atol=5e-4)
+    np.testing.assert_allclose(Hemicube(patches=4).uniform_moments(15)[[1, 3]], 0.456, atol=5e-4)

@@ -17,6 +17,9 @@ EXTENTS = {
     "half a side": (-1.0, 1.0, 0.0, 1.0),
 }
 
+# So small that area is solid angle.
+FLAT = (-1e-6, 1e-6, -1e-6, 1e-6)
+
 
 def seen(extent, boxes, side=400):
     """Means and variances of light uniform in solid angle over boxes, by many small cells."""
@@ -38,7 +41,7 @@ def seen(extent, boxes, side=400):
 
 @pytest.mark.parametrize("name", EXTENTS)
 def test_uniform_transport(name):
-    extent = np.array(EXTENTS[name])
+    extent = EXTENTS[name]
     found = uniform_moments(extent)
     (mu, mv), (vu, vv) = seen(extent, [(0, 1, 0, 1)], 2000)
     np.testing.assert_allclose(found[[U, V]], [mu[0], mv[0]], atol=1e-7)
@@ -54,35 +57,31 @@ def test_uniform_transport(name):
 
 def test_what_is_said_of_it():
     """0.544 is the mirror of 0.456: a corner patch is seen nearer to the face's middle."""
-    assert 1 - uniform_moments(np.array(EXTENTS["corner of 4x4"]))[U] == pytest.approx(
-        0.456, abs=5e-4
-    )
-    assert 1 - uniform_moments(np.array(EXTENTS["corner of 2x2"]))[U] == pytest.approx(
-        0.426, abs=5e-4
-    )
-    np.testing.assert_allclose(uniform_moments(None), [1, 1 / 2, 1 / 3, 1 / 2, 1 / 3, 1 / 4])
+    assert 1 - uniform_moments(EXTENTS["corner of 4x4"])[U] == pytest.approx(0.456, abs=5e-4)
+    assert 1 - uniform_moments(EXTENTS["corner of 2x2"])[U] == pytest.approx(0.426, abs=5e-4)
+    np.testing.assert_allclose(uniform_moments(FLAT), [1, 1 / 2, 1 / 3, 1 / 2, 1 / 3, 1 / 4])
     cube = Hemicube(patches=4)
-    np.testing.assert_allclose(cube.uniform_moments(0), uniform_moments(cube.extents[0]))
+    np.testing.assert_allclose(cube.uniform_moments(0), uniform_moments(cube.extent(0)))
 
 
 @pytest.mark.parametrize("name", EXTENTS)
 def test_a_planted_box_comes_back(name):
     rng = np.random.default_rng(1)
-    extent = np.array(EXTENTS[name])
+    extent = EXTENTS[name]
     size = rng.uniform(0.01, 0.98, (60, 2))
     low = rng.uniform(0, 1 - size)
     boxes = np.stack([low[:, 0], low[:, 0] + size[:, 0], low[:, 1], low[:, 1] + size[:, 1]], -1)
     mean, variance = seen(extent, boxes)
     found = box_of(mean, variance, extent)
-    np.testing.assert_allclose(found, boxes, atol=1e-3)
+    np.testing.assert_allclose(found, boxes, atol=1e-4)
     # by area it would be off by much more, on all but small patches
     if name not in ("middle of 16x16",):
-        assert np.abs(box_of(mean, variance, None) - boxes).max() > 5e-3
+        assert np.abs(box_of(mean, variance, FLAT) - boxes).max() > 5e-3
 
 
 def test_points_and_rims():
     """A point is a box without width; what is spread wider than any box is cut at the patch."""
-    extent = np.array(EXTENTS["corner of 2x2"])
+    extent = EXTENTS["corner of 2x2"]
     point = box_of((np.array([0.3]), np.array([0.9])), (np.zeros(1), np.zeros(1)), extent)
     np.testing.assert_allclose(point, [[0.3, 0.3, 0.9, 0.9]], atol=1e-12)
     rims = box_of((np.array([0.5]), np.array([0.5])), (np.full(1, 0.25), np.full(1, 0.25)), extent)

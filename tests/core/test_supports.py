@@ -25,7 +25,7 @@ def moments(hits) -> Moments:
     weights[2:, 30:60] = 0
     weights[:, -1] = 0
     u[:, 60:80] = rng.choice([0.0, 1.0], (30, 20))
-    return Moments.from_basis(hits(ALL, u, v, weights), ALL, True)
+    return Moments.from_basis(hits(ALL, u, v, weights), ALL, Hemicube(patches=2).extent(0), True)
 
 
 @pytest.mark.parametrize("support", MODELS, ids=lambda s: s.name)
@@ -55,7 +55,7 @@ def test_a_model_uses_only_the_moments_that_it_asks_for(moments: Moments, suppor
     def blind(m: Moments) -> Moments:
         normalised = m.normalised.copy()
         normalised[[i for i in range(len(MONOMIALS)) if i not in support.needs]] = np.nan
-        return Moments(m.coefficient, normalised, tuple(blind(c) for c in m.channels))
+        return Moments(m.coefficient, normalised, m.extent, tuple(blind(c) for c in m.channels))
 
     np.testing.assert_array_equal(support.fit(blind(moments)), support.fit(moments))
 
