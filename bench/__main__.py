@@ -152,6 +152,16 @@ def _changes(options: argparse.Namespace) -> None:
     print(page())
 
 
+def _field(options: argparse.Namespace) -> None:
+    from .field import field, table
+
+    rows = []
+    for row in field(options.json, options.only):
+        rows.append(row)
+        print(row["case"], row["status"], row["text"], flush=True)
+    print(table(rows))
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
@@ -235,6 +245,11 @@ def main() -> int:
     c = commands.add_parser("changes", help="what a capture changes, as a page of the docs")
     c.add_argument("page", type=Path, nargs="?")
     c.set_defaults(run=_changes)
+
+    c = commands.add_parser("field", help="scenes and worlds as artists bring them")
+    c.add_argument("--json", type=Path)
+    c.add_argument("--only", nargs="+", help="cases that begin so")
+    c.set_defaults(run=_field)
 
     c = commands.add_parser("patterns", help="what each set of patterns can identify")
     c.set_defaults(run=_patterns)

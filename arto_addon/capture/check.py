@@ -7,6 +7,7 @@ import bpy
 from ...core.errors import SceneError
 from ..stage.stage import picture_size
 from ..world.check import check_no_volume, world_of
+from .simulations import unbaked
 
 # Blender itself renders none smaller, denoising and the world behind included.
 LEAST_PIXELS = 4
@@ -28,6 +29,12 @@ def check_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> None:
     if min(width, height) < LEAST_PIXELS:
         raise SceneError(
             f"the picture has only {width}x{height} pixels: raise the resolution or its percentage"
+        )
+    if moving := unbaked(scene, view_layer or scene.view_layers[0].name):
+        were = "was" if moving.startswith(("the cloth", "the soft", "the hair")) else "were"
+        raise SceneError(
+            f"{moving} {were} played and not baked, and a capture would show them elsewhere: bake "
+            "them (Physics properties, Cache), or go to their first frame"
         )
     if not scene.arto.faces:
         raise SceneError("the hemicube has no faces: choose at least one")
