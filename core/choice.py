@@ -126,18 +126,17 @@ def choose(
 ) -> tuple[NDArray[np.uint8], dict[int, NDArray]]:
     """Model codes of n pixels for patch k, and for each code in use the parameters of its pixels.
 
-    basis: (P, n, 3), the patch's images; coefficient: (n, 3) of theirs, the very numbers that the
-    evidence is of (worked out again, they may differ in the last digit, and what is just bright
-    enough be lost); extent: of patch k on its face; choice: `auto`, or one model for every pixel
-    that gets light from the patch; separate: supports of each channel's own.
+    basis: (P, n, 3), the patch's images; coefficient: (n, 3) of theirs; extent: of patch k on its
+    face; choice: `auto`, or one model for every pixel that gets light from the patch; separate:
+    supports of each channel's own.
     """
     codes = np.full(basis.shape[1], NOTHING, np.uint8)
     if choice == "auto":
         # most entries are too dark to keep: what they see of their patch is not asked for, and
         # their light goes into the pixel's rest
-        lit = known.kept(k, coefficient)
+        lit = known.kept(k)
         moments = Moments.from_basis(basis[:, lit], patterns, extent, separate)
-        codes[lit] = _smallest(moments, known.hits(k, coefficient)[lit])
+        codes[lit] = _smallest(moments, known.hits(k, lit))
     else:
         lit = np.flatnonzero((coefficient > 0).any(axis=-1))
         moments = Moments.from_basis(basis[:, lit], patterns, extent, separate)

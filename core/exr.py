@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import mmap
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import ExrError
-from .exr_layout import LayoutError
+from .exr_layout import LayoutError, PlainPart
 from .exr_layout import check as check_layout
+from .exr_layout import plain as plain_parts
 from .files import whole
 
 _ORDER = "RGBAXYZ"  # of channels in an array; others follow
@@ -53,17 +55,41 @@ def _parts(path: Path, header_only: bool) -> list[Any]:
 
 def _check_complete(path: Path) -> int:
     """How many parts the file has; ExrError unless all of it is there (`exr_layout`)."""
+    with _opened(path) as data, _telling(path):
+        return check_layout(data)
+
+
+def _mapped(path: Path) -> tuple[mmap.mmap, list[PlainPart] | None]:
+    """The bytes of a file, and its parts where they may be read there; ExrError as above."""
+    data = _opened(path)
+    try:
+        with _telling(path):
+            return data, plain_parts(data)
+    except ExrError:
+        data.close()
+        raise
+
+
+def _opened(path: Path) -> mmap.mmap:
+    """The bytes of a file. Raises ExrError."""
     if not path.is_file():
         raise ExrError(f"there is no file {path}: it was moved or deleted; make it again")
     try:
         if path.stat().st_size < 8:
             raise ExrError(f"{path} is no EXR file (or an empty one): make it again")
-        with path.open("rb") as f, mmap.mmap(f.fileno(), 0, access=mmap.ACCESS_READ) as data:
-            return check_layout(data)
-    except LayoutError as e:
-        raise ExrError(f"{path} is truncated or damaged, {e}: make it again") from None
+        with path.open("rb") as f:
+            return mmap.mmap(f.fileno(), 0, access=mmap.ACCESS_READ)
     except OSError as e:
         raise ExrError(f"{path} cannot be read ({e}): look at its permissions and disk") from e
+
+
+@contextmanager
+def _telling(path: Path) -> Iterator[None]:
+    """Says of which file a layout is wrong."""
+    try:
+        yield
+    except LayoutError as e:
+        raise ExrError(f"{path} is truncated or damaged, {e}: make it again") from None
 
 
 def part_names(path: Path) -> list[str]:
@@ -89,21 +115,81 @@ def parts(path: Path) -> Iterator[tuple[str, NDArray]]:
     layer's name is that of its channels before the last dot. Raises ExrError for a file that is
     missing, truncated, or has layers of odd channels.
     """
-    found = _parts(path, header_only=False)
-    for name, (part, channels) in _layers(path, [(p.header, p.channels) for p in found]).items():
-        # one layer at a time goes from the library's arrays into ours: nothing is there twice
-        planes = [found[part].channels.pop(channel).pixels for channel in channels]
+    with Layers(path) as layers:
+        for name in layers.names:
+            yield name, layers.take(name)
+
+
+class Layers:
+    """The layers of a file, each read when it is asked for; see `parts`.
+
+    Of a file whose pixels lie in it as they are, as those of a capture do, nothing else is in
+    memory; another is decoded when it is opened, and `take` lets go of what it gives. To be closed.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._data, plain = _mapped(path)
+        self._plain: list[PlainPart] = plain or []
+        self._decoded: list[Any] = []
+        if self._plain:
+            heads = [({"name": p.name}, [c for c, _ in p.channels]) for p in self._plain]
+        else:
+            self._decoded = _parts(path, header_only=False)
+            heads = [(p.header, list(p.channels)) for p in self._decoded]
+        self._layers = _layers(path, heads)
+
+    def __enter__(self) -> Layers:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._decoded = []
+        self._data.close()
+
+    @property
+    def names(self) -> list[str]:
+        return list(self._layers)
+
+    def read(self, name: str) -> NDArray:
+        """A layer, (H, W, C)."""
+        return self._filled(name, self._planes(name))
+
+    def take(self, name: str) -> NDArray:
+        """A layer, (H, W, C), for the last time: it is never in memory twice."""
+        planes = self._planes(name)
+        if self._decoded:
+            part, channels = self._layers[name]
+            for channel in channels:
+                del self._decoded[part].channels[channel]
+        return self._filled(name, planes)
+
+    def _planes(self, name: str) -> list[NDArray]:
+        part, channels = self._layers[name]
+        if not self._plain:
+            return [self._decoded[part].channels[channel].pixels for channel in channels]
+        there = self._plain[part]
+        found, at = {}, there.offset
+        for channel, kind in there.channels:
+            dtype = np.dtype("<f2" if kind == 1 else "<f4")
+            found[channel] = np.ndarray(
+                (there.height, there.width), dtype, self._data, at, (there.stride, dtype.itemsize)
+            )
+            at += there.width * dtype.itemsize
+        return [found[channel] for channel in channels]
+
+    def _filled(self, name: str, planes: list[NDArray]) -> NDArray:
         if any(pixels is None for pixels in planes):
-            raise ExrError(f"{path} has no pixels in '{name}': make it again")
+            raise ExrError(f"{self.path} has no pixels in '{name}': make it again")
         if len({pixels.shape for pixels in planes}) > 1:
             raise ExrError(
-                f"{path} has channels of different sizes in '{name}': save it without subsampling"
+                f"{self.path} has channels of different sizes in '{name}': save it without "
+                "subsampling"
             )
         half = all(pixels.dtype == np.float16 for pixels in planes)
         out = np.empty((*planes[0].shape, len(planes)), np.float16 if half else np.float32)
         for n in range(len(planes)):
             out[..., n], planes[n] = planes[n], None
-        yield name, out
+        return out
 
 
 def _layers(

@@ -23,6 +23,7 @@ _MOST_ATTRIBUTES = 4096
 # HTJ2K256, HTJ2K32.
 _LINES = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256, 256, 32)
 _NONE = 0
+_UINT = 0
 # Bytes that one byte of a chunk may stand for: deflate's limit, and what flat pictures come to in
 # the others.
 _MOST_PACKED = {1: 130, 2: 1100, 3: 1100, 5: 1100}
@@ -38,17 +39,61 @@ class LayoutError(Exception):
 class _Part:
     """What of a header decides where its chunks are."""
 
+    name: str
     width: int
     height: int
     compression: int
+    channels: tuple[tuple[str, int], ...]
     pixel_bytes: int
     sampled: bool
     tiles: tuple[int, int, int] | None
     chunks: int
 
 
+@dataclass(frozen=True)
+class PlainPart:
+    """A part whose lines lie in the file as they are, one after the other.
+
+    channels: name and kind (1 half, 2 float) of each, in the order that they have in a line;
+    offset: where the first line's pixels begin; stride: from a line to the next, in bytes.
+    """
+
+    name: str
+    width: int
+    height: int
+    channels: tuple[tuple[str, int], ...]
+    offset: int
+    stride: int
+
+
 def check(data: mmap.mmap | bytes) -> int:
     """How many parts the file has. Raises LayoutError for one that is not whole."""
+    return len(_checked(data)[0])
+
+
+def plain(data: mmap.mmap | bytes) -> list[PlainPart] | None:
+    """The parts of a file whose pixels may be read where they lie; None where any is packed, tiled
+    or out of order. Raises LayoutError for a file that is not whole."""
+    parts, tables, leader = _checked(data)
+    found = []
+    for part, table in zip(parts, tables, strict=True):
+        stride = leader + 4 + part.width * part.pixel_bytes
+        apart = part.compression != _NONE or part.tiles or part.sampled
+        if apart or (np.diff(table.astype(np.int64)) != stride).any():
+            return None
+        if any(kind == _UINT for _, kind in part.channels):
+            return None
+        first = int(table[0])
+        # each line says how long it is, and which one: the first is enough where all are alike
+        if struct.unpack_from("<I", data, first + leader)[0] != stride - leader - 4:
+            return None
+        offset = first + leader + 4
+        found.append(PlainPart(part.name, part.width, part.height, part.channels, offset, stride))
+    return found
+
+
+def _checked(data: mmap.mmap | bytes) -> tuple[list[_Part], list[NDArray], int]:
+    """The parts, the table of each, and the bytes before a chunk's size. Raises LayoutError."""
     if len(data) < 8 or data[:4] != b"\x76\x2f\x31\x01":
         raise LayoutError("it is no EXR file")
     flags = struct.unpack_from("<I", data, 4)[0]
@@ -65,7 +110,7 @@ def check(data: mmap.mmap | bytes) -> int:
         at = end
     for number, (part, table) in enumerate(zip(parts, tables, strict=True)):
         _check_chunks(data, part, table, at, number if multipart else None)
-    return len(parts)
+    return parts, tables, 8 if multipart else 4
 
 
 def _headers(data: mmap.mmap | bytes, multipart: bool, tiled: bool) -> tuple[list[_Part], int]:
@@ -113,7 +158,8 @@ def _part(attributes: dict[bytes, bytes], multipart: bool, tiled: bool) -> _Part
     try:
         x0, y0, x1, y1 = struct.unpack("<4i", attributes[b"dataWindow"])
         (compression,) = struct.unpack("<B", attributes[b"compression"])
-        pixel_bytes, sampled = _channels(attributes[b"channels"])
+        channels, sampled = _channels(attributes[b"channels"])
+        pixel_bytes = sum(_PIXEL_BYTES[kind] for _, kind in channels)
         kind = attributes.get(b"type", b"").rstrip(b"\0")
         said = attributes.get(b"chunkCount")
         said_chunks = struct.unpack("<i", said)[0] if said is not None else None
@@ -138,12 +184,13 @@ def _part(attributes: dict[bytes, bytes], multipart: bool, tiled: bool) -> _Part
         chunks = said_chunks
     if chunks is None or chunks < 1 or (multipart and said_chunks not in (None, chunks)):
         raise LayoutError("its number of chunks is not that of its pixels")
-    return _Part(width, height, compression, pixel_bytes, sampled, tiles, chunks)
+    name = attributes.get(b"name", b"").rstrip(b"\0").decode("utf-8", "replace")
+    return _Part(name, width, height, compression, channels, pixel_bytes, sampled, tiles, chunks)
 
 
-def _channels(data: bytes) -> tuple[int, bool]:
-    """Bytes of a pixel in all channels, and whether any has not all pixels."""
-    total, at, sampled = 0, 0, False
+def _channels(data: bytes) -> tuple[tuple[tuple[str, int], ...], bool]:
+    """Name and kind of each channel, and whether any has not all pixels."""
+    found, at, sampled = [], 0, False
     while True:
         name, at = _text(data, at)
         if not name:
@@ -152,11 +199,11 @@ def _channels(data: bytes) -> tuple[int, bool]:
         at += 16
         if kind not in _PIXEL_BYTES or x < 1 or y < 1:
             raise LayoutError("it has a damaged channel")
-        total += _PIXEL_BYTES[kind]
+        found.append((name.decode("utf-8", "replace"), kind))
         sampled |= x > 1 or y > 1
-    if not total:
+    if not found:
         raise LayoutError("it has no channels")
-    return total, sampled
+    return tuple(found), sampled
 
 
 def _tile_count(width: int, height: int, tile_width: int, tile_height: int, mode: int) -> int:

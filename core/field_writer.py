@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .errors import FieldError
 from .field import HEADER, VERSION
-from .files import PART, replace_folder
+from .files import PART, replace_folder, write_text
 from .hemicube import Hemicube
 from .region import Region
 from .supports import BY_CODE, NOTHING, REST
@@ -94,38 +94,62 @@ class TileWriter:
         return used
 
 
+def describe(hemicube: Hemicube, shape: tuple[int, int], **about: Any) -> dict[str, Any]:
+    """A new `field.json` without tiles. `about` takes whatever else a reader should know."""
+    return {
+        "format": "ARTO reflectance field",
+        "version": VERSION,
+        "height": shape[0],
+        "width": shape[1],
+        "hemicube": hemicube.to_json(),
+        "patches": len(hemicube),
+        "about": about,
+        "tiles": [],
+    }
+
+
+def write_tile(
+    folder: Path, number: int, tile: TileWriter, of: Path | None = None
+) -> dict[str, Any]:
+    """Write a tile into the folder of a field, whole or not at all -> its entry in `field.json`.
+
+    of: the field that it will be, for messages. Raises FieldError.
+    """
+    name = f"tile_{number:04d}"
+    r = tile.region
+    partial = folder / (name + PART)
+    with _writing(of or folder):
+        shutil.rmtree(partial, ignore_errors=True)
+        used = tile.write(partial)
+        replace_folder(partial, folder / name)
+    return {"folder": name, "region": [r.x, r.y, r.width, r.height], "entries": used}
+
+
+def write_head(folder: Path, head: dict[str, Any]) -> None:
+    """Write `field.json`: with it the field is one. Raises FieldError."""
+    with _writing(folder):
+        write_text(folder / HEADER, json.dumps(head, indent=1))
+
+
 class FieldWriter:
     """Writes a field tile by tile. It is there only once `close` has returned."""
 
     def __init__(self, folder: Path, hemicube: Hemicube, shape: tuple[int, int], **about: Any):
         self.folder = folder
         self.partial = folder.with_name(folder.name + PART)
-        self.head: dict[str, Any] = {
-            "format": "ARTO reflectance field",
-            "version": VERSION,
-            "height": shape[0],
-            "width": shape[1],
-            "hemicube": hemicube.to_json(),
-            "patches": len(hemicube),
-            "about": about,
-            "tiles": [],
-        }
+        self.head = describe(hemicube, shape, **about)
         with _writing(folder):
             shutil.rmtree(self.partial, ignore_errors=True)
             self.partial.mkdir(parents=True)
 
     def add(self, tile: TileWriter) -> None:
-        name = f"tile_{len(self.head['tiles']):04d}"
-        r = tile.region
-        with _writing(self.folder):
-            used = tile.write(self.partial / name)
         self.head["tiles"].append(
-            {"folder": name, "region": [r.x, r.y, r.width, r.height], "entries": used}
+            write_tile(self.partial, len(self.head["tiles"]), tile, self.folder)
         )
 
     def close(self) -> None:
+        write_head(self.partial, self.head)
         with _writing(self.folder):
-            (self.partial / HEADER).write_text(json.dumps(self.head, indent=1))
             replace_folder(self.partial, self.folder)
 
     def abandon(self) -> None:

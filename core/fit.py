@@ -8,20 +8,25 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import choice as choices
-from .capture_set import CaptureSet, TileData
+from .basis_images import BasisImages, TileData
+from .capture_set import CaptureSet
 from .evidence import evidence
 from .field_writer import FieldWriter, TileWriter
 from .hemicube import Hemicube
-from .moments import Moments, channel_sum
+from .moments import Moments
 from .patterns import PatternSet
 from .search import search
 from .supports import BOX, WHOLE
 
+# How much of the work on a tile the first pass over its images is, about.
+READING = 0.4
+
 
 def fit_tile(
-    data: TileData,
+    data: BasisImages | TileData,
     patterns: PatternSet,
     hemicube: Hemicube,
     choice: str,
@@ -30,45 +35,59 @@ def fit_tile(
 ) -> Iterator[float | TileWriter]:
     """Fit one tile: yields the share that is done, and last the tile, ready to be written.
 
-    samples: samples a pixel of the capture, which tell how far its noise can be believed (None: no
-    noise); separate: a support for each channel.
+    What is in memory of it at a time is one patch's images, a number for each patch and pixel, and
+    what was fitted. samples: samples a pixel of the capture, which tell how far its noise can be
+    believed (None: no noise); separate: a support for each channel.
     """
-    layers = {"own": data.own, "alpha": data.alpha, **data.guides}
-    writer = TileWriter(data.region, layers)
-    patches = len(data.basis)
-    images = data.basis.reshape(patches, len(patterns), -1, 3)
-    coefficients = patterns.coefficient(np.moveaxis(images, 1, 0))
+    patches = len(hemicube)
     shape = (data.region.height, data.region.width)
-    known = evidence(coefficients, shape, hemicube.solid_angles, samples, data.grain)
+    sizes = np.empty((patches, data.region.pixels), np.float32)
+
+    def look(k: int, images: NDArray) -> None:
+        coefficient = patterns.coefficient(images)
+        np.add(coefficient[..., 0], coefficient[..., 1], out=sizes[k].reshape(shape))
+        sizes[k] += coefficient[..., 2].ravel()
+
+    around = data.around(look)
+    yield READING
+    layers = {"own": around.own, "alpha": around.alpha, **around.guides}
+    writer = TileWriter(data.region, layers)
+    known = evidence(sizes, shape, hemicube.solid_angles, samples, data.grain_of)
     brightest = None
     if choice == choices.STAGE_AND_MATTE:
-        brightest = channel_sum(coefficients).argmax(axis=0)
+        brightest = sizes.argmax(axis=0)
     for k in range(patches):
         extent = hemicube.extent(k)
+        images = data.images(k).reshape(len(patterns), -1, 3)
+        coefficient = patterns.coefficient(images)
         if choice == choices.SEARCH:
-            codes, _ = choices.choose(
-                "whole", images[k], coefficients[k], patterns, known, k, extent
-            )
-            boxes = search(images[k], patterns, extent, data.region.height)
+            codes, _ = choices.choose("whole", images, coefficient, patterns, known, k, extent)
+            boxes = search(images, patterns, extent, data.region.height)
             parameters = {BOX.code: boxes[codes == WHOLE.code]}
             codes[codes == WHOLE.code] = BOX.code
         elif brightest is not None:
             # the straightforward combination: a Light Stage, and one matte where it is brightest
-            codes, _ = choices.choose(
-                "whole", images[k], coefficients[k], patterns, known, k, extent
-            )
+            codes, _ = choices.choose("whole", images, coefficient, patterns, known, k, extent)
             codes[(brightest == k) & (codes == WHOLE.code)] = BOX.code
             parameters = {
-                s.code: s.fit(Moments.from_basis(images[k][:, codes == s.code], patterns, extent))
+                s.code: s.fit(Moments.from_basis(images[:, codes == s.code], patterns, extent))
                 for s in (WHOLE, BOX)
             }
         else:
             codes, parameters = choices.choose(
-                choice, images[k], coefficients[k], patterns, known, k, extent, separate
+                choice, images, coefficient, patterns, known, k, extent, separate
             )
-        writer.add(codes, coefficients[k], parameters)
-        yield (k + 1) / patches
+        writer.add(codes, coefficient, parameters)
+        yield READING + (1 - READING) * (k + 1) / patches
     yield writer
+
+
+def about_of(captured: CaptureSet, choice: str, separate: bool, **about: Any) -> dict[str, Any]:
+    """What a field of a capture set says of itself, beside its tiles."""
+    keep = ("scene", "colour_space", "samples", "file", "frame", "view_layer", "far", "key")
+    keep += ("fingerprint", "route", "shot")
+    known = {key: captured.head[key] for key in keep if key in captured.head}
+    return {"choice": choice, "separate": separate} | known | about
 
 
 def fit(
@@ -85,31 +104,25 @@ def fit(
     there. Raises CaptureSetError, FieldError, PatternError.
     """
     choices.check(choice, captured.patterns, separate)
-    samples = captured.samples
-    begun = time.perf_counter()
-    reading = 0.0
-    keep = ("scene", "colour_space", "samples", "file", "frame", "view_layer", "far", "key")
-    keep += ("fingerprint", "route")
-    about = {key: captured.head[key] for key in keep if key in captured.head} | about
-    writer = FieldWriter(
-        folder, captured.hemicube, captured.shape, choice=choice, separate=separate, **about
-    )
+    begun, reading = time.perf_counter(), 0.0
+    about = about_of(captured, choice, separate, **about)
+    writer = FieldWriter(folder, captured.hemicube, captured.shape, **about)
     try:
         tiles = len(captured.regions)
         for tile in range(tiles):
-            yield tile / tiles, f"reading tile {tile + 1} of {tiles}"
+            yield tile / tiles, f"fitting tile {tile + 1} of {tiles}"
             start = time.perf_counter()
-            data = captured.read(tile)
-            reading += time.perf_counter() - start
-            for step in fit_tile(
-                data, captured.patterns, captured.hemicube, choice, samples, separate
-            ):
-                if isinstance(step, TileWriter):
-                    writer.add(step)
-                else:
-                    yield (tile + step) / tiles, f"fitting tile {tile + 1} of {tiles}"
-        seconds = time.perf_counter() - begun
-        writer.head["about"]["fit_seconds"] = round(seconds, 3)
+            with captured.open(tile) as data:
+                for step in fit_tile(
+                    data, captured.patterns, captured.hemicube, choice, captured.samples, separate
+                ):
+                    if isinstance(step, TileWriter):
+                        writer.add(step)
+                    else:
+                        if step == READING:
+                            reading += time.perf_counter() - start
+                        yield (tile + step) / tiles, f"fitting tile {tile + 1} of {tiles}"
+        writer.head["about"]["fit_seconds"] = round(time.perf_counter() - begun, 3)
         writer.head["about"]["read_seconds"] = round(reading, 3)
         writer.close()
     finally:

@@ -11,7 +11,8 @@ from pathlib import Path
 import bpy
 
 from ...core import exr
-from ...core.capture_set import GRAIN, GROUP, VERSION, describe, group_name, write_header
+from ...core.basis_images import GRAIN, GROUP, group_name
+from ...core.capture_set import VERSION, describe, write_header
 from ...core.errors import ArtoError, CaptureSetError, SceneError
 from ...core.files import Lock, whole
 from ...core.hemicube import Hemicube

@@ -11,7 +11,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...core.capture_set import GRAIN, group_name
+from ...core.basis_images import GRAIN, group_name
 from ...core.hemicube import FACE_NAMES, Hemicube
 from ...core.patterns import PatternSet, pattern_set
 from ..blender.nodes import Nodes

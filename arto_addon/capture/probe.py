@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core.capture_set import GROUP
+from ...core.basis_images import GROUP
 from ...core.errors import CaptureSetError
 from ...core.hemicube import FINEST, Hemicube
 from ...core.patterns import pattern_set

@@ -87,8 +87,9 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     lap("world")
     parts: list[NDArray[np.float32]] = []
     lamps, together = "no", False
+    found = split(environment, None if field.hemicube.closed else field.hemicube)
+    has_lamps = found.worth
     if settings.lamps:
-        found = split(environment, None if field.hemicube.closed else field.hemicube)
         if found.worth and not field.about.get("far", True):
             lamps = "no: lamps at infinity would not stand where a near hemicube has them"
             yield Progress(0.3, f"the world's lamps: {lamps}")
@@ -149,7 +150,7 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
             rows, columns = np.nonzero(inside[..., 3] < OPAQUE)
             if len(rows):
                 seen = Region.around(rows + captured.y, columns + captured.x)
-                there = background(scene, seen, layer)[captured.slices]
+                there = background(scene, seen, layer, has_lamps)[captured.slices]
                 picture[captured.slices] = over(inside, there)
         lap("background")
     yield Progress(0.9, f"writing {path}")

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import bpy
+import numpy as np
 
 from ...core.errors import SceneError
 from ...core.region import Region
@@ -136,8 +137,13 @@ def picture_region(scene: bpy.types.Scene) -> Region:
     r = scene.render
     if not r.use_border:
         return Region(0, 0, width, height)
-    x0, x1 = int(r.border_min_x * width + 0.5), int(r.border_max_x * width + 0.5)
-    y0, y1 = int(r.border_min_y * height + 0.5), int(r.border_max_y * height + 0.5)
+
+    def edge(share: float, size: int) -> int:
+        # as Blender does: cut off, and in its own precision (0.7 of 10 pixels is 7)
+        return int(np.float32(share) * np.float32(size))
+
+    x0, x1 = edge(r.border_min_x, width), edge(r.border_max_x, width)
+    y0, y1 = edge(r.border_min_y, height), edge(r.border_max_y, height)
     if x1 <= x0 or y1 <= y0:
         raise SceneError("the render region is empty: draw it again, or turn it off")
     return Region(x0, height - y1, x1 - x0, y1 - y0)

@@ -24,8 +24,12 @@ BACKGROUND_SAMPLES = 64
 BACKGROUND_NOISE = 0.002
 
 
-def _set(on: Stage, world: bpy.types.World, region: Region) -> None:
-    """The stage with the world on it, and samples for nothing but the world."""
+def _set(on: Stage, world: bpy.types.World, region: Region, even: bool) -> None:
+    """The stage with the world on it, and samples for nothing but the world.
+
+    even: as many for every pixel. Where a sun is smaller than a pixel, a pixel that looks even may
+    have missed it.
+    """
     prepare(on, layers=0)
     # whatever the artist looks at meanwhile: the field is Cycles'
     on.scene.render.engine = "CYCLES"
@@ -36,7 +40,7 @@ def _set(on: Stage, world: bpy.types.World, region: Region) -> None:
     # nothing is lit here, so no map of where the light comes from is needed
     on.scene.world.cycles.sampling_method = "NONE"
     cycles.samples = BACKGROUND_SAMPLES
-    cycles.use_adaptive_sampling = True
+    cycles.use_adaptive_sampling = not even
     cycles.adaptive_threshold = BACKGROUND_NOISE
     cycles.adaptive_min_samples = 8
     set_region(on.scene, region)
@@ -53,14 +57,17 @@ def _render(on: Stage) -> dict[str, NDArray]:
 
 
 def background(
-    scene: bpy.types.Scene, region: Region | None = None, view_layer: str | None = None
+    scene: bpy.types.Scene,
+    region: Region | None = None,
+    view_layer: str | None = None,
+    even: bool = False,
 ) -> NDArray[np.float32]:
     """The world as the artist's camera sees it behind everything -> (H, W, 3).
 
     It is rendered from a copy of the scene with nothing in it: lens, motion blur, film and whatever
     else the scene has are the scene's. region: all that is looked at, 0 outside (default:
     everything). Pixels get as many samples as they need, up to `BACKGROUND_SAMPLES`: next to none
-    in an even sky, all on the rim of a sun.
+    in an even sky, all on the rim of a sun; or all of them (`even`), for a world with lamps.
     """
     layer = view_layer or layer_of(scene)
     world = check_world(scene, layer)
@@ -68,7 +75,7 @@ def background(
     region = region or Region(0, 0, width, height)
     out = np.zeros((height, width, 3), np.float32)
     with stage(scene, layer) as on:
-        _set(on, world, region)
+        _set(on, world, region, even)
         float_exr(on.scene.render, multilayer=False)
         root = on.scene.collection
         for child in list(root.children):
@@ -108,7 +115,7 @@ def background_with_holes(
     width, height = picture_size(scene)
     out = np.zeros((height, width, 4), np.float32)
     with stage(scene, view_layer) as on:
-        _set(on, world, region)
+        _set(on, world, region, even=True)
         # a world for the camera alone, in a light group of its own: what else is lit is no matter
         rays = on.scene.world.cycles_visibility
         for prop in rays.bl_rna.properties:
@@ -118,7 +125,6 @@ def background_with_holes(
         on.scene.world.lightgroup = group
         on.scene.view_layers[0].lightgroups.add(name=group)
         on.scene.cycles.max_bounces = 0
-        on.scene.cycles.use_adaptive_sampling = False  # it would look at what is lit
         parts = _render(on)
     light = next(pixels for name, pixels in parts.items() if name.endswith(group))
     whole = next(pixels for name, pixels in parts.items() if name.endswith("Combined"))

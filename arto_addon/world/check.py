@@ -19,12 +19,18 @@ def world_of(scene: bpy.types.Scene, view_layer: str | None = None) -> bpy.types
 
 
 def check_world(scene: bpy.types.Scene, view_layer: str | None = None) -> bpy.types.World:
-    """The world of a view layer. Raises SceneError where there is none, it has a volume, or an
-    image of it is missing."""
+    """The world of a view layer. Raises SceneError where there is none, the layer leaves it out, it
+    has a volume, or an image of it is missing."""
     world = world_of(scene, view_layer)
     if world is None:
         raise SceneError(
             "the scene has no world to relight with: add one with an HDRI (World properties)"
+        )
+    layer = scene.view_layers[view_layer or layer_of(scene)]
+    if not layer.use_sky:
+        raise SceneError(
+            f"the view layer '{layer.name}' has Environment off, so that no world lights it: turn "
+            "it on (View Layer properties, Filter)"
         )
     check_no_volume(world)
     for tree in trees(world.node_tree, set()):

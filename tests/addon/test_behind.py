@@ -10,7 +10,7 @@ import pytest
 from arto.arto_addon import work
 from arto.arto_addon.blender.output import float_exr, write_to
 from arto.arto_addon.relight import relight
-from arto.arto_addon.stage.stage import stage
+from arto.arto_addon.stage.stage import picture_region, stage
 from arto.arto_addon.world.background import background
 from arto.core import exr
 from scene_tools import small_scene
@@ -124,3 +124,31 @@ def test_transparent_glass_is_said(tmp_path):
     path, _ = work.run(relight.relight(scene), steps.append)
     assert any("Transparent Glass" in s.text for s in steps)
     assert "Transparent Glass" in exr.header(path)["arto.glass"]
+
+
+@pytest.mark.parametrize("edges", [(0.2, 0.8, 0.1, 0.9), (0.31, 0.7, 0.37, 0.68)])
+def test_a_region_between_pixels(tmp_path, edges):
+    """The pixels that F12 fills, of a region drawn by hand, are those that are captured."""
+    scene = sky(tmp_path)
+    r = scene.render
+    r.resolution_x, r.resolution_y = 47, 30
+    r.use_border = True
+    r.border_min_x, r.border_max_x, r.border_min_y, r.border_max_y = edges
+    filled = own_picture(scene, 1, tmp_path)[..., 3] > 0
+    y, x = picture_region(scene).slices
+    assert filled[y, x].all() and filled.sum() == filled[y, x].size
+
+
+def test_a_sun_smaller_than_a_pixel_is_behind(tmp_path):
+    """A few samples miss it, and the pixel then looks even: its light is Cycles', on average."""
+    scene = sky(tmp_path)
+    texels = np.full((512, 1024, 3), 0.2, np.float32)
+    # three texels of a map: one degree, of pixels of three; above what stands there
+    texels[512 // 2 - 40 : 512 // 2 - 37, 256 : 256 + 3] = 400
+    hdri(scene, texels)
+    scene.camera.data.angle = math.radians(75)
+    scene.camera.rotation_euler.x = math.radians(100)
+    expected = np.mean([own_picture(scene, 256, tmp_path, s, empty=True) for s in (1, 2)], axis=0)
+    found = background(scene, even=True)
+    assert expected[..., 0].max() > 5
+    assert found[..., 0].mean() == pytest.approx(expected[..., 0].mean(), rel=0.03)

@@ -13,7 +13,7 @@ from arto.arto_addon import fit, work
 from arto.arto_addon.capture import capture
 from arto.arto_addon.shot import paths, status
 from arto.core import exr
-from arto.core.capture_set import GROUP
+from arto.core.basis_images import GROUP
 from arto.core.errors import ArtoError, CancelledError, CaptureSetError, SceneError
 from scene_tools import (
     HEIGHT,

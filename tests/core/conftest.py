@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from arto.core import capture_set, exr, fit
+from arto.core import basis_images, capture_set, exr, fit
 from arto.core.environment import Environment
 from arto.core.field import Field
 from arto.core.hemicube import Hemicube
@@ -171,7 +171,7 @@ def _write_scene(folder: Path, scene: Scene, regions: list[Region] | None = None
         layers = {"Combined": np.dstack([rgb, scene.alpha[cut]]).astype(np.float32)}
         for k in range(len(scene.hemicube)):
             for p, name in enumerate(scene.patterns.patterns):
-                part = f"Combined_{capture_set.group_name(k, name)}"
+                part = f"Combined_{basis_images.group_name(k, name)}"
                 layers[part] = scene.basis[k, p][cut]
         exr.write(folder / f"tile_{n:04d}.exr", layers)
         head["tiles"].append(

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
-from arto.core import capture_set, exr
+from arto.core import basis_images, capture_set, exr
 from arto.core.capture_set import HEADER, CaptureSet
 from arto.core.errors import CaptureSetError
 from arto.core.hemicube import Hemicube
@@ -142,10 +142,10 @@ def test_a_tile_may_lie_in_several_files(tmp_path: Path, scene, write_scene) -> 
 
 
 def test_a_name_says_patch_and_pattern() -> None:
-    name = f"Combined_{capture_set.group_name(7, 'gradient45')}"
-    match = capture_set.GROUP.search(f"ViewLayer.{name}")
+    name = f"Combined_{basis_images.group_name(7, 'gradient45')}"
+    match = basis_images.GROUP.search(f"ViewLayer.{name}")
     assert match and (int(match[1]), match[2]) == (7, "gradient45")
-    assert capture_set.GROUP.search(f"Not{name}") is None
+    assert basis_images.GROUP.search(f"Not{name}") is None
 
 
 # --- what is refused -----------------------------------------------------------------------------
@@ -236,7 +236,7 @@ def test_no_whole_picture(folder: Path) -> None:
 
 def test_another_size(folder: Path) -> None:
     change_header(folder, tiles=[{"region": [0, 0, 7, 6], "files": [FILE], "done": True}])
-    refused(folder, FILE, "has the size 8x6 with 4 channels, not 7x6 with 4")
+    refused(folder, FILE, "has the size 8x6 with 3 channels, not 7x6 with 3")
 
 
 def test_another_count_of_channels(folder: Path) -> None:

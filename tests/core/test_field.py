@@ -177,7 +177,7 @@ def test_about_says_what_made_it(tmp_path: Path, scene) -> None:
     assert about["fit_seconds"] >= about["read_seconds"] >= 0
     shares = [share for share, _ in steps]
     assert shares == sorted(shares) and shares[0] == 0 and shares[-1] == 1
-    assert len(steps) == len(CUBE) + 1
+    assert len(steps) == len(CUBE) + 2
 
 
 # --- whole or not at all -------------------------------------------------------------------------
@@ -405,7 +405,7 @@ def rest_field(folder: Path, coefficients: np.ndarray) -> Field:
     white = pattern_set("linear")
     k, n = coefficients.shape[:2]
     tile = TileWriter(Region(0, 0, n, 1), {"own": np.zeros((1, n, 3)), "alpha": np.ones((1, n))})
-    known = evidence(coefficients, (1, n), cube.solid_angles)
+    known = evidence(coefficients.sum(axis=-1).astype(np.float32), (1, n), cube.solid_angles)
     uniform = [cube.uniform_moments(i)[[0, 1, 3]] for i in range(k)]
     for i in range(k):
         basis = uniform[i][:, None, None] * coefficients[i]
