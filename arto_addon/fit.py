@@ -2,15 +2,29 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 
 from ..core.capture_set import CaptureSet
-from ..core.errors import CaptureSetError
+from ..core.errors import CaptureSetError, FieldError
+from ..core.field import Field
 from ..core.files import Lock
 from ..core.fit import fit as fit_captured
+from .relight.denoise import cleaned
 from .shot import paths, status
 from .shot.shot import check_same_shot, layer_of, shot_of
 from .work import Progress, Steps
+
+
+def _is_fitted(captured: CaptureSet, folder: Path, choice: str, separate: bool) -> bool:
+    """Whether the field in a folder is what fitting would make."""
+    try:
+        about = Field(folder).about
+    except FieldError:
+        return False
+    then = about.get("key"), about.get("choice"), about.get("separate", False)
+    return then[0] is not None and then == (captured.head.get("key"), choice, separate)
 
 
 def fit(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
@@ -31,14 +45,25 @@ def fit(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
         check_same_shot(scene, paths.nearest(scene, layer), "the capture set", layer)
     captured = CaptureSet(folder)
     check_same_shot(scene, captured.head.get("shot"), "the capture set", layer)
+    settings = scene.arto
+    there = place.source / "field"
+    if _is_fitted(captured, there, settings.support, settings.separate):
+        yield Progress(1.0, "there is nothing to fit: the field is of this capture")
+        return there
+    if not captured.kept:
+        raise CaptureSetError(
+            "the basis images of this capture were not kept, so nothing can be fitted to them "
+            f"anew: set Support back to '{captured.head.get('choice')}', or capture again with "
+            "Keep Basis Images on Always"
+        )
     # a capture set of the version before is read where it is; its field goes where fields are now
     target = (paths.claim(scene, layer) if place.earlier else place.folder) / "field"
     with Lock(target.parent, f"fitting {shot_of(scene, layer).title}"):
         about = {"shot": captured.head.get("shot", {})}
-        settings = scene.arto
         work = fit_captured(captured, target, settings.support, settings.separate, **about)
         for share, text in work:
             yield Progress(share, text)
+        yield from cleaned(scene, target)
     paths.forget()
     yield Progress(1.0, f"fitted {len(captured.hemicube)} patches of {captured.pixels} pixels")
     return target

@@ -45,6 +45,7 @@ def new_scene(name: str, width: int, height: int) -> bpy.types.Scene:
         import arto
 
         arto.register()
+    scene.arto.keep = "always"  # they are looked at in many ways
     return scene
 
 

@@ -19,18 +19,24 @@ def default_resolution(hemicube: Hemicube, environment: Environment) -> NDArray[
 
 
 def sample_bins(
-    hemicube: Hemicube, height: int, width: int, resolutions: NDArray, offsets: NDArray
+    hemicube: Hemicube,
+    height: int,
+    width: int,
+    resolutions: NDArray,
+    offsets: NDArray,
+    turn: float = 0.0,
 ) -> tuple[NDArray, NDArray]:
-    """Bin of every sample of a map of that size (-1: no patch), and each sample's solid angle.
+    """Bin of every sample of a map of that size, turned by `turn` (-1: no patch), and each sample's
+    solid angle.
 
     The same for every map of a size, so the last one is kept: turning through HDRIs is common.
     """
-    key = (hemicube, height, width, resolutions.tobytes())
+    key = (hemicube, height, width, resolutions.tobytes(), turn)
     if key in _CACHE:
         return _CACHE[key]
     # two samples a bin and axis on average; a narrow bin may still stay empty
     finer = max(1, int(np.ceil(8 * (resolutions * hemicube.sides).max() / width)))
-    azimuth, latitude, weight = sample_directions(height, width, finer)
+    azimuth, latitude, weight = sample_directions(height, width, finer, turn)
     # float64: float32 moves a sample on a patch's border to the other side
     bins = np.empty((height * finer, width * finer), np.int32)
 

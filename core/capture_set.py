@@ -65,6 +65,7 @@ class CaptureSet:
         said.texts("fingerprint")
         for name, kind in (
             ("key", str), ("view_layer", str), ("shot", dict), ("route", str), ("grain", bool),
+            ("kept", bool), ("choice", str), ("separate", bool),
         ):  # fmt: skip
             said.kind(name, kind)
         if not unfinished and not all(done):
@@ -87,7 +88,7 @@ class CaptureSet:
     def open(self, tile: int) -> BasisImages:
         """The basis images of a tile, to be read patch by patch; to be closed. Raises
         CaptureSetError for whatever would bend the light, here or when it is read."""
-        if not self.kept:
+        if not self.kept and not self.files[tile]:
             raise CaptureSetError(
                 f"the basis images of {self.folder} were not kept: capture again, with Keep Basis "
                 "Images on Always"

@@ -19,9 +19,14 @@ from .errors import EnvironmentMapError
 
 @dataclass(frozen=True)
 class Environment:
-    """An equirectangular map: `image` is (H, W, 3) float32, scene-linear."""
+    """An equirectangular map: `image` is (H, W, 3) float32, scene-linear.
+
+    turn: radians by which a direction is turned about the vertical, counterclockwise from above,
+    before it is looked up: turning an HDRI moves no texel.
+    """
 
     image: NDArray[np.float32]
+    turn: float = 0.0
 
     def __post_init__(self) -> None:
         shape = self.image.shape
@@ -61,7 +66,8 @@ class Environment:
         """(..., 3) directions, any length -> (..., 3) radiance of the texels that they meet."""
         height, width = self.image.shape[:2]
         x, y, z = np.moveaxis(directions, -1, 0)
-        column = np.floor((0.5 - np.arctan2(y, x) / (2 * np.pi)) * width).astype(np.intp) % width
+        azimuth = np.arctan2(y, x) + self.turn
+        column = np.floor((0.5 - azimuth / (2 * np.pi)) * width).astype(np.intp) % width
         row = np.floor((0.5 - np.arctan2(z, np.hypot(x, y)) / np.pi) * height).astype(np.intp)
         return self.image[np.minimum(row, height - 1), column]
 
@@ -79,8 +85,10 @@ def directions(azimuth: NDArray, latitude: NDArray) -> NDArray[np.float64]:
     return out
 
 
-def sample_directions(height: int, width: int, finer: int) -> tuple[NDArray, NDArray, NDArray]:
-    """Directions of a grid `finer` times as fine as a map of height x width.
+def sample_directions(
+    height: int, width: int, finer: int, turn: float = 0.0
+) -> tuple[NDArray, NDArray, NDArray]:
+    """Directions of a grid `finer` times as fine as a map of height x width, turned by `turn`.
 
     -> azimuth unit vectors (W * finer, 2), latitudes (H * finer,), solid angle of one sample of
     each row (H * finer,). Separate, because a map is a product of the two.
@@ -90,5 +98,5 @@ def sample_directions(height: int, width: int, finer: int) -> tuple[NDArray, NDA
     latitude = (edges[:-1] + edges[1:]) / 2
     weight = (np.sin(edges[:-1]) - np.sin(edges[1:])) * (2 * np.pi / columns)
     u = (np.arange(columns) + 0.5) / columns
-    azimuth = (0.5 - u) * 2 * np.pi
+    azimuth = (0.5 - u) * 2 * np.pi - turn
     return np.stack([np.cos(azimuth), np.sin(azimuth)], axis=-1), latitude, weight

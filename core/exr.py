@@ -132,6 +132,7 @@ class Layers:
         self._data, plain = _mapped(path)
         self._plain: list[PlainPart] = plain or []
         self._decoded: list[Any] = []
+        heads: list[tuple[dict[str, Any], Iterable[str]]]
         if self._plain:
             heads = [({"name": p.name}, [c for c, _ in p.channels]) for p in self._plain]
         else:
@@ -187,8 +188,8 @@ class Layers:
             )
         half = all(pixels.dtype == np.float16 for pixels in planes)
         out = np.empty((*planes[0].shape, len(planes)), np.float16 if half else np.float32)
-        for n in range(len(planes)):
-            out[..., n], planes[n] = planes[n], None
+        for n in reversed(range(len(planes))):
+            out[..., n] = planes.pop()  # which lets go of it
         return out
 
 

@@ -27,7 +27,7 @@ _OTHERS = ("codes", "scales", "rest", "rest_weights")
 # What others ask a field's `about` for.
 _ABOUT: dict[str, type | tuple[type, ...]] = {
     "shot": dict, "fingerprint": dict, "view_layer": str, "key": str, "route": str, "choice": str,
-    "samples": (int, float), "far": bool,
+    "samples": (int, float), "far": bool, "separate": bool, "guides": str,
 }  # fmt: skip
 LAYERS = ("own", "alpha", "albedo", "normal", "depth")
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .errors import FieldError
 from .field import HEADER, VERSION
-from .files import PART, replace_folder, write_text
+from .files import PART, replace_folder, whole, write_text
 from .hemicube import Hemicube
 from .region import Region
 from .supports import BY_CODE, NOTHING, REST
@@ -89,8 +89,7 @@ class TileWriter:
             weights = np.where(weights > 0, np.maximum(weights, 1e-30), 0)
             np.save(folder / "rest_weights.npy", weights.astype(np.float32))
         for name, pixels in self.layers.items():
-            dtype = np.float32 if name in ("own", "depth") else np.float16
-            np.save(folder / f"{name}.npy", pixels.astype(dtype))
+            write_layer(folder, name, pixels)
         return used
 
 
@@ -129,6 +128,13 @@ def write_head(folder: Path, head: dict[str, Any]) -> None:
     """Write `field.json`: with it the field is one. Raises FieldError."""
     with _writing(folder):
         write_text(folder / HEADER, json.dumps(head, indent=1))
+
+
+def write_layer(folder: Path, name: str, pixels: NDArray) -> None:
+    """Write one of `field.LAYERS` of a tile into its folder, whole or not at all."""
+    dtype = np.float32 if name in ("own", "depth") else np.float16
+    with whole(folder / f"{name}.npy") as partial, partial.open("wb") as f:
+        np.save(f, pixels.astype(dtype))
 
 
 class FieldWriter:

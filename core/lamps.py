@@ -55,7 +55,8 @@ def split(
     image = environment.image
     radiance = np.maximum(image.sum(axis=-1, dtype=np.float64), 0)
     if hemicube is not None:
-        radiance *= _covered(hemicube, *radiance.shape)
+        height, width = radiance.shape
+        radiance *= _covered(hemicube, height, width, environment.turn)
     weight = environment.row_solid_angles[:, None] / (4 * np.pi)
     total = float((radiance * weight).sum())
     level = np.inf
@@ -68,10 +69,11 @@ def split(
     taken = np.divide(above, radiance, out=np.zeros_like(radiance), where=radiance > 0)
     lamps = (image * taken[..., None]).astype(np.float32)
     share = float((above * weight).sum()) / total if total > 0 else 0.0
-    return Split(Environment(image - lamps), Environment(lamps), share)
+    turn = environment.turn
+    return Split(Environment(image - lamps, turn), Environment(lamps, turn), share)
 
 
-def _covered(hemicube: Hemicube, height: int, width: int) -> NDArray[np.bool_]:
+def _covered(hemicube: Hemicube, height: int, width: int, turn: float) -> NDArray[np.bool_]:
     """Which texels of a map lie in the direction of a patch -> (height, width)."""
-    azimuth, latitude, _ = sample_directions(height, width, 1)
+    azimuth, latitude, _ = sample_directions(height, width, 1, turn)
     return hemicube.locate(directions(azimuth, latitude))[0] >= 0

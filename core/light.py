@@ -38,7 +38,9 @@ class PatchLight:
         self._offsets = _starts(self.resolutions**2)
         self._tables = _starts((self.resolutions + 1) ** 2)
         height, width = environment.image.shape[:2]
-        bins, weight = sample_bins(hemicube, height, width, self.resolutions, self._offsets)
+        bins, weight = sample_bins(
+            hemicube, height, width, self.resolutions, self._offsets, environment.turn
+        )
         finer = bins.shape[0] // height
         lit = bins.ravel() >= 0
         index = bins.ravel()[lit]

@@ -68,7 +68,7 @@ def small_scene(folder: Path, lamp: bool = False) -> bpy.types.Scene:
     settings = scene.arto
     settings.folder = str(folder / "arto")
     settings.output = str(folder / "relit.exr")
-    settings.samples, settings.patches = 64, 1
+    settings.samples, settings.patches, settings.keep = 64, 1, "always"
     settings.patterns, settings.grain, settings.adaptive = "moments", True, False
     # the one thing of the artist's that a capture adds to is the scene's ID
     scene_id.give(scene)

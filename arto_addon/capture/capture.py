@@ -5,21 +5,25 @@ from __future__ import annotations
 import hashlib
 import json
 import time
+from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import Any
 
 import bpy
 
 from ...core import exr
 from ...core.basis_images import GRAIN, GROUP, group_name
 from ...core.capture_set import VERSION, describe, write_header
+from ...core.choice import check as check_choice
 from ...core.errors import ArtoError, CaptureSetError, SceneError
 from ...core.files import Lock, whole
 from ...core.hemicube import Hemicube
 from ...core.patterns import pattern_set
-from ...core.refine import check as can_refine
 from ...core.region import Region
+from ...core.shot import Shot
 from ..blender.output import write_to
+from ..relight.denoise import cleaned
 from ..shot import home, paths
 from ..shot.fingerprint import fingerprint, key_of
 from ..shot.shot import shot_of
@@ -29,13 +33,10 @@ from ..stage.stage import Stage, picture_region, set_region, stage
 from ..work import Progress, Render, Steps
 from . import planes
 from .check import check_scene
-from .light_check import check_light
-from .plan import SAMPLED, render_plan, tiles_of
-from .probe import refined
-from .resume import empty, finish, unfinished
-
-# How many times as many patches as the grid has the probe may hand out.
-ADAPTIVE_SHARE = 2
+from .plan import SAMPLED, render_plan
+from .planned import Given, planned
+from .resume import empty, finish, finish_field, let_go, unfinished
+from .stream import Stream
 
 
 def geometry(scene: bpy.types.Scene, seen: Rendered) -> Hemicube:
@@ -67,69 +68,58 @@ def _check_file(path: Path, images: list[tuple[int, str]]) -> None:
         )
 
 
-def capture(scene: bpy.types.Scene, view_layer: str) -> Steps:
+def capture(
+    scene: bpy.types.Scene,
+    view_layer: str,
+    only_estimate: bool = False,
+    given: Given | None = None,
+) -> Steps:
     """Render the basis images of a scene into its capture set; returns the folder.
 
-    A set left unfinished by the same capture of the same scene is gone on with; an earlier finished
-    one stays until the new one is complete, and so do unfinished ones of other settings. Raises
-    SceneError, CaptureSetError, BusyError (another process captures this shot), ExrError,
-    CancelledError; the scene stays as it is, but for the ID that its shots are found by.
+    Where the settings keep no basis images, each tile is fitted as it comes, and the field takes
+    the place of the shot's. A set left unfinished by the same capture of the same scene is gone on
+    with; an earlier finished one stays until the new one is complete, and so do unfinished ones of
+    other settings. only_estimate: stop before the first long render; returns the `room.Estimate`;
+    given: see there. Raises SceneError, CaptureSetError, FieldError, PatternError, BusyError
+    (another process captures this shot), ExrError, CancelledError; the scene stays as it is, but
+    for the ID that its shots are found by.
     """
     check_scene(scene, view_layer)
     # whatever a script has moved is where it should be
     scene.view_layers[view_layer].update()
+    if scene.arto.keep == "never":
+        check_choice(scene.arto.support, pattern_set(scene.arto.patterns), scene.arto.separate)
     claimed = paths.claim(scene, view_layer)
     with Lock(claimed, f"capturing {shot_of(scene, view_layer).title}"):
-        return (yield from _capture(scene, view_layer, claimed))
+        return (yield from _capture(scene, view_layer, claimed, only_estimate, given))
 
 
-def _capture(scene: bpy.types.Scene, view_layer: str, claimed: Path) -> Steps:
+def _capture(
+    scene: bpy.types.Scene,
+    view_layer: str,
+    claimed: Path,
+    only_estimate: bool,
+    given: Given | None,
+) -> Steps:
     settings = scene.arto
-    patterns = pattern_set(settings.patterns)
     region = picture_region(scene)
     found = fingerprint(scene, view_layer, full=True)
     with stage(scene, view_layer) as on:
         seen = rendered(on)
         seen.check()
-        hemicube = geometry(scene, seen)
+        hemicube = given.hemicube if given else geometry(scene, seen)
         # between renders the paths differ, and grain would not be theirs
         grain = settings.grain and settings.route == "all"
-        names = [*patterns.patterns, *([GRAIN] if grain else [])]
-        prepare(on, layers=len(names))
+        prepare(on, layers=len(pattern_set(settings.patterns)) + grain)
         shot = shot_of(scene, view_layer, region)
-        decides = {
-            "samples": settings.samples,
-            "seed": settings.seed,
-            "route": settings.route,
-            "grain": grain,
-            "adaptive": settings.adaptive,
-            "far": settings.far,
-            "blender": bpy.app.version_string,
-            "colour_space": bpy.data.colorspace.working_space,
-            "film_transparent": scene.render.film_transparent,
-            "changed": on.changed,
-        }
-        size = (shot.height, shot.width)
-        # names are not in it: a renamed file or scene goes on with what it has
-        frame = [shot.camera_matrix, shot.lens, shot.frame, shot.subframe, shot.view_layer]
-        asked = [describe(hemicube, patterns, size, **decides), vars(region), frame]
-        asked += [settings.memory, key_of(found), VERSION]
+        asked, decides = _asked(scene, on, hemicube, shot, region, grain, found)
         key = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:16]
         folder = paths.unfinished_folder(claimed, key)
         head = unfinished(folder, key)
-        if head is None:
-            if settings.adaptive:
-                can_refine(hemicube)  # before anything is rendered
-            route, light = settings.route, None
-            if settings.far:
-                # a near hemicube is no world: what it lights differs by what it is near to
-                sampled, light = yield from check_light(on, hemicube)
-                route = SAMPLED if sampled else route
-            if settings.adaptive and route != SAMPLED:
-                hemicube = yield from refined(on, hemicube, ADAPTIVE_SHARE * len(hemicube))
-            names = [n for n in names if n != GRAIN or route == "all"]
-            plan = render_plan(route, hemicube, names)
-            tiles = tiles_of(region, max(map(len, plan)), settings.memory)
+        if head is None or only_estimate:
+            plan = yield from planned(scene, on, hemicube, region, grain, folder, given)
+            if only_estimate:
+                return plan.estimate
             about = {
                 "scene": scene.name,
                 "file": home.file(),
@@ -137,25 +127,99 @@ def _capture(scene: bpy.types.Scene, view_layer: str, claimed: Path) -> Steps:
                 "shot": shot.to_json(),
                 "frame": scene.frame_current,
                 "fingerprint": found,
-                "caution": light,
+                "caution": plan.caution,
             }
-            decides |= {"route": route, "grain": GRAIN in names}
-            head = describe(hemicube, patterns, size, key=key, **decides, **about)
+            decides |= {
+                "route": plan.route,
+                "grain": plan.grain,
+                "kept": plan.kept,
+                "choice": settings.support,
+                "separate": settings.separate,
+            }
+            size = (shot.height, shot.width)
+            patterns = pattern_set(settings.patterns)
+            head = describe(plan.hemicube, patterns, size, key=key, **decides, **about)
             head["seconds"] = 0.0
             head["tiles"] = [
-                {"region": [t.x, t.y, t.width, t.height], "files": [], "done": False} for t in tiles
+                {"region": [t.x, t.y, t.width, t.height], "files": [], "done": False}
+                for t in plan.tiles
             ]
             empty(folder)
-        hemicube = Hemicube.from_json(head["hemicube"])
-        names = [*patterns.patterns, *([GRAIN] if head["grain"] else [])]
-        plan = render_plan(head["route"], hemicube, names)
-        tiles = [Region(*t["region"]) for t in head["tiles"]]
-        write_header(folder, head)
-        total = len(plan) * len(tiles)
+        yield from _render_tiles(on, folder, head)
+    if not head["kept"]:
+        finish_field(folder, claimed / "field", head)
+        yield from cleaned(scene, claimed / "field")
+    finish(folder, claimed / "capture")
+    paths.forget()
+    caution = f". CAUTION: {head['caution']['text']}" if head.get("caution") else ""
+    yield Progress(1.0, f"captured {head['patches']} patches{caution}")
+    return claimed / "capture"
+
+
+def _asked(
+    scene: bpy.types.Scene,
+    on: Stage,
+    hemicube: Hemicube,
+    shot: Shot,
+    region: Region,
+    grain: bool,
+    found: dict[str, str],
+) -> tuple[list[Any], dict[str, Any]]:
+    """What tells a capture from another, and what of it goes into its description."""
+    settings = scene.arto
+    patterns = pattern_set(settings.patterns)
+    decides = {
+        "samples": settings.samples,
+        "seed": settings.seed,
+        "route": settings.route,
+        "grain": grain,
+        "adaptive": settings.adaptive,
+        "far": settings.far,
+        "blender": bpy.app.version_string,
+        "colour_space": bpy.data.colorspace.working_space,
+        "film_transparent": scene.render.film_transparent,
+        "changed": on.changed,
+    }
+    # names are not in it: a renamed file or scene goes on with what it has
+    frame = [shot.camera_matrix, shot.lens, shot.frame, shot.subframe, shot.view_layer]
+    asked = [describe(hemicube, patterns, (shot.height, shot.width), **decides), vars(region)]
+    asked += [frame, settings.memory, key_of(found), VERSION, settings.keep]
+    if settings.keep != "always":
+        asked += [settings.keep_limit, settings.support, settings.separate]
+    return asked, decides
+
+
+def _render_tiles(on: Stage, folder: Path, head: dict[str, Any]) -> Steps:
+    """Render what is not there yet of a capture set, and fit it where it is not kept."""
+    hemicube = Hemicube.from_json(head["hemicube"])
+    patterns = pattern_set(head["patterns"])
+    names = [*patterns.patterns, *([GRAIN] if head["grain"] else [])]
+    plan = render_plan(head["route"], hemicube, names)
+    tiles = [Region(*t["region"]) for t in head["tiles"]]
+    stream = None if head["kept"] else Stream(folder, head["choice"], head["separate"])
+    write_header(folder, head)
+    total = len(plan) * len(tiles)
+
+    def take(patience: float | None) -> bool:
+        """Note down the tile that was fitted; whether one still is being fitted."""
+        if stream and (ended := stream.ended(patience)):
+            number, fitted = ended
+            let_go(folder, head, number, fitted)
+        return stream is not None and stream.busy
+
+    def fit(number: int) -> Iterator[Progress]:
+        while take(0.1):
+            yield Progress((number + 0.5) / len(tiles), f"fitting tile {number} of {len(tiles)}")
+        if stream:
+            stream.start(number)
+
+    try:
         for t, tile in enumerate(tiles):
             entry = head["tiles"][t]
             if entry["done"]:
                 yield Progress((t + 1) / len(tiles), f"tile {t + 1} of {len(tiles)} is there")
+                if stream and "fitted" not in entry:
+                    yield from fit(t)
                 continue
             set_region(on.scene, tile)
             entry["files"] = []
@@ -175,11 +239,13 @@ def _capture(scene: bpy.types.Scene, view_layer: str, claimed: Path) -> Steps:
                 entry["files"].append(name)
             entry["done"] = True
             write_header(folder, head)
-    finish(folder, claimed / "capture")
-    paths.forget()
-    caution = f". CAUTION: {head['caution']['text']}" if head.get("caution") else ""
-    yield Progress(1.0, f"captured {len(hemicube)} patches in {total} renders{caution}")
-    return claimed / "capture"
+            take(0.0)
+            yield from fit(t)
+        while take(0.1):
+            yield Progress(0.99, f"fitting tile {len(tiles)} of {len(tiles)}")
+    finally:
+        if stream:
+            stream.stop()
 
 
 def _is_whole(path: Path, images: list[tuple[int, str]]) -> bool:

@@ -12,19 +12,16 @@ from .planes import MOST_SAMPLED
 
 # The route of a scene whose light comes in by shadow rays (`light_check`): not one to be chosen.
 SAMPLED = "sampled"
-# Cycles and Blender's result each hold a group's pass: 3 floats, twice.
-BYTES_PER_PASS = 24
-OTHER_PASSES = 8
 
 
-def tiles_of(region: Region, passes: int, budget_megabytes: int) -> list[Region]:
-    """Cut a region into strips whose passes fit the budget."""
-    row = region.width * (passes + OTHER_PASSES) * BYTES_PER_PASS
-    rows = budget_megabytes * 2**20 // row
+def tiles_of(region: Region, bytes_a_pixel: int, budget: int) -> list[Region]:
+    """Cut a region into strips that fit a budget, in bytes."""
+    row = region.width * bytes_a_pixel
+    rows = budget // row
     if rows < 1:
         raise SceneError(
-            f"a single row of the picture takes {row / 2**20:.0f} MB in {passes} passes: raise "
-            "the memory budget, or capture fewer patches or patterns"
+            f"a single row of the picture takes {row / 2**20:.0f} MB: raise the memory budget, or "
+            "capture fewer patches or patterns"
         )
     count = -(-region.height // rows)
     edges = [region.height * i // count for i in range(count + 1)]

@@ -24,6 +24,13 @@ def refined(on: Stage, hemicube: Hemicube, most: int) -> Steps:
 
     Raises CancelledError, CaptureSetError, ExrError, HemicubeError; the stage is left as it was.
     """
+    found = yield from probed(on, hemicube)
+    return refine(hemicube, found, SAMPLES, most)
+
+
+def probed(on: Stage, hemicube: Hemicube) -> Steps:
+    """Render a probe of the prepared stage -> (F * 16 * 16, h, w, 3), see `refine`. Raises as
+    `refined` does."""
     check(hemicube)
     fine = replace(hemicube, patches=FINEST)
     patterns = pattern_set("white")
@@ -37,5 +44,4 @@ def refined(on: Stage, hemicube: Hemicube, most: int) -> Steps:
             f"the probe lacks {missing} of {len(fine)} light groups: make room on the disk for "
             "temporary files, or turn Adaptive Patches off"
         )
-    probe = np.stack([by_patch[k] for k in range(len(fine))])
-    return refine(hemicube, probe, SAMPLES, most)
+    return np.stack([by_patch[k] for k in range(len(fine))])

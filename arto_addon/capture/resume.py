@@ -7,9 +7,13 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from ...core.capture_set import HEADER, CaptureSet
-from ...core.errors import ArtoError, CaptureSetError
+from ...core.capture_set import HEADER, CaptureSet, write_header
+from ...core.errors import ArtoError, CaptureSetError, FieldError
+from ...core.field import Field
+from ...core.field_writer import describe, write_head
 from ...core.files import PART, replace_folder
+from ...core.fit import about_of
+from .stream import Stream
 
 
 def unfinished(folder: Path, key: str) -> dict[str, Any] | None:
@@ -41,4 +45,38 @@ def finish(unfinished: Path, folder: Path) -> None:
         raise CaptureSetError(
             f"{unfinished} is complete but cannot take the place of {folder} ({e}): close what "
             "uses that folder and capture again, no render is repeated"
+        ) from e
+
+
+def let_go(folder: Path, head: dict[str, Any], number: int, fitted: dict[str, Any]) -> None:
+    """Note down that a tile was fitted, then remove its basis images."""
+    entry = head["tiles"][number]
+    files, entry["files"] = entry["files"], []
+    entry["fitted"] = fitted
+    write_header(folder, head)
+    for name in files:
+        (folder / name).unlink(missing_ok=True)
+
+
+def finish_field(unfinished: Path, folder: Path, head: dict[str, Any]) -> None:
+    """Put the field of a capture that was fitted as it came where the last one is."""
+    partial = unfinished / Stream.FIELD
+    if not partial.exists():
+        # a process that was killed has put it there already
+        if Field(folder).about.get("key") == head["key"]:
+            return
+        raise FieldError(
+            f"the fitted tiles of {unfinished} are gone: discard it, and capture again"
+        )
+    captured = CaptureSet(unfinished)
+    about = about_of(captured, head["choice"], head["separate"])
+    described = describe(captured.hemicube, captured.shape, **about)
+    described["tiles"] = [entry["fitted"] for entry in head["tiles"]]
+    write_head(partial, described)
+    try:
+        replace_folder(partial, folder)
+    except OSError as e:
+        raise FieldError(
+            f"{partial} is complete but cannot take the place of {folder} ({e}): close what uses "
+            "that folder and capture again, no render is repeated"
         ) from e

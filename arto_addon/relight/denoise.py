@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from ...core import exr
 from ...core.field import Field
+from ...core.field_writer import write_head, write_layer
 from ..blender.output import float_exr, write_to
-from ..work import Render, blocking_render
+from ..work import Progress, Render, Steps, blocking_render
 
 _available: list[bool] = []
 
@@ -42,6 +43,39 @@ def guides_of(field: Field) -> dict[str, NDArray]:
     return {n: field.layer(n) for n in names if field.has_layer(n)}
 
 
+def clean(field: Field) -> bool:
+    """Whether a field's guides have next to no noise."""
+    about = field.about
+    return about.get("guides") == CLEAN or about.get("samples", 0) >= CLEAN_SAMPLES
+
+
+# What a field says of guides that were denoised when it was written.
+CLEAN = "clean"
+
+
+def cleaned(scene: bpy.types.Scene, folder: Path) -> Steps:
+    """Denoise the guides of a new field, so that no relight has to, where the scene's relights are
+    denoised at all."""
+    field = Field(folder)
+    guides = guides_of(field)
+    if not scene.arto.denoise or clean(field) or not guides or not available():
+        return
+    yield Progress(0.99, "denoising the guides")
+    for name, pixels in guides.items():
+        # a normal is from -1 to 1, and a denoiser of pictures knows nothing below 0
+        low, span = (-1.0, 2.0) if name == "normal" else (0.0, 1.0)
+        noisy = ((pixels - low) / span).astype(np.float32)
+        better = denoise({}, noisy, like=scene) * span + low
+        for tile in field.tiles:
+            write_layer(tile.folder, name, better[tile.region.slices])
+    field.head["about"]["guides"] = CLEAN
+    write_head(folder, field.head)
+
+
+# Of a scene's render settings, those of the compositor's denoiser.
+_DENOISER = ("compositor_denoise_device", "compositor_denoise_final_quality")
+
+
 def _sum(tree: Any, one: Any, other: Any) -> Any:
     """The sum of two colours in a compositor tree."""
     node = tree.nodes.new("ShaderNodeMix")
@@ -54,13 +88,17 @@ def _sum(tree: Any, one: Any, other: Any) -> Any:
 
 
 def denoise(
-    guides: dict[str, NDArray], *pictures: NDArray[np.float32], clean: bool = False
+    guides: dict[str, NDArray],
+    *pictures: NDArray[np.float32],
+    clean: bool = False,
+    like: bpy.types.Scene | None = None,
 ) -> NDArray[np.float32]:
     """The sum of pictures (H, W, 3), scene-linear, each denoised by itself.
 
     Parts of a picture with noise of different size are cleaned better one by one.
     guides: `albedo` and `normal`, (H, W, 3), or neither; clean: they have next to no noise, and
-    need not be denoised themselves, which takes longer than the pictures.
+    need not be denoised themselves, which takes longer than the pictures; like: the scene whose
+    denoiser it is, by device and quality.
     """
     height, width = pictures[0].shape[:2]
     studio = bpy.data.scenes.new("ARTO Denoise")
@@ -105,6 +143,8 @@ def denoise(
             render.resolution_percentage = 100
             render.use_compositing = True
             render.compositor_device, render.compositor_precision = "CPU", "FULL"
+            for name in _DENOISER if like else ():
+                setattr(render, name, getattr(like.render, name))
             float_exr(render, multilayer=False)
             path = Path(folder) / "denoised.exr"
             write_to(render, path)

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.environment import Environment
 from ...core.field import Field
-from ...core.lamps import split
+from ...core.lamps import Split, split
 from ...core.light import PatchLight
 from ...core.region import Region
 from ...core.relight import over
@@ -20,8 +24,8 @@ from ..shot import paths
 from ..shot.shot import check_same_shot, layer_of
 from ..shot.status import changed_since
 from ..work import Progress, Steps
+from ..world import kept
 from ..world.background import background, background_with_holes, holds_out
-from ..world.bake import bake
 from ..world.check import check_world, differs_by_rays
 from ..world.lamp_render import brightness, lamp_light, region_of
 from . import denoise, plate
@@ -38,6 +42,41 @@ LEAST_SAMPLES = 4
 def lamp_samples(scene: bpy.types.Scene, share: float) -> int:
     """Samples of the render of lamps that have this share of the light."""
     return max(LEAST_SAMPLES, math.ceil(scene.arto.lamp_samples * share))
+
+
+@dataclass(frozen=True)
+class Light:
+    """A light to show a shot in. world: None for the view layer's own; path: of the picture;
+    look: what it is called in the picture's header."""
+
+    path: Path
+    look: str = ""
+    world: bpy.types.World | None = None
+
+
+class Shown:
+    """A shot's field, opened: what all the lights that it is shown in have in common.
+
+    Raises SceneError, CaptureSetError (of another shot), ShotError (another's), FieldError.
+    """
+
+    def __init__(self, scene: bpy.types.Scene, view_layer: str, folder: Path | None = None) -> None:
+        self.scene, self.layer = scene, view_layer
+        if folder is None:
+            folder = paths.field_folder(scene, view_layer)
+            if not folder.exists() and not paths.capture_folder(scene, view_layer).exists():
+                near = paths.nearest(scene, view_layer)
+                check_same_shot(scene, near, "the reflectance field", view_layer)
+        self.field = Field(folder)
+        self.held = self.field.about.get("route") == SAMPLED
+
+    @cached_property
+    def guides(self) -> dict[str, NDArray]:
+        return denoise.guides_of(self.field)
+
+    @cached_property
+    def own(self) -> NDArray[np.float32]:
+        return self.field.layer("own")
 
 
 def relight(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
@@ -58,19 +97,20 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     EnvironmentMapError, ExrError, CancelledError; nothing of the scene changes.
     """
     layer = view_layer or layer_of(scene)
-    world = check_world(scene, layer)
+    check_world(scene, layer)
     scene.view_layers[layer].update()
-    settings = scene.arto
     path = paths.relit_file(scene)
-    folder = paths.field_folder(scene, layer)
-    if not folder.exists() and not paths.capture_folder(scene, layer).exists():
-        check_same_shot(scene, paths.nearest(scene, layer), "the reflectance field", layer)
-    field = Field(folder)
-    check_same_shot(scene, field.about.get("shot"), "the reflectance field", layer)
-    changed = changed_since(scene, layer, field.about, now=True)
-    if changed:
-        # allowed: it is the artist who knows whether it shows
-        yield Progress(0.0, f"the scene is not the captured one: {'; '.join(changed[:3])}")
+    shown = Shown(scene, layer)
+    check_same_shot(scene, shown.field.about.get("shot"), "the reflectance field", layer)
+    seconds = yield from show(shown, Light(path, scene.arto.look))
+    return path, seconds
+
+
+def show(shown: Shown, lit: Light) -> Steps:
+    """Write the picture of a field in a light; returns seconds by part. Raises as `compute`."""
+    scene, layer, field, path = shown.scene, shown.layer, shown.field, lit.path
+    settings = scene.arto
+    world = lit.world or check_world(scene, layer)
     seconds: dict[str, float] = {}
     last = time.perf_counter()
 
@@ -80,44 +120,27 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
         seconds[name] = now - last
         last = now
 
+    changed = changed_since(scene, layer, field.about, now=True)
+    if changed:
+        # allowed: it is the artist who knows whether it shows
+        yield Progress(0.0, f"the scene is not the captured one: {'; '.join(changed[:3])}")
     yield Progress(0.0, "bringing the world to an environment map")
     if by_rays := differs_by_rays(world):
         yield Progress(0.0, f"the world is {by_rays}")
-    environment = whole = bake(scene, settings.environment_width, layer)
+    whole = kept.environment(scene, settings.environment_width, layer, lit.world)
     lap("world")
-    parts: list[NDArray[np.float32]] = []
-    lamps, together = "no", False
-    found = split(environment, None if field.hemicube.closed else field.hemicube)
-    has_lamps = found.worth
-    if settings.lamps:
-        if found.worth and not field.about.get("far", True):
-            lamps = "no: lamps at infinity would not stand where a near hemicube has them"
-            yield Progress(0.3, f"the world's lamps: {lamps}")
-        elif found.worth and "view_layer" not in field.about:
-            lamps = "no: the field does not say of which view layer it is; capture again"
-            yield Progress(0.3, f"the world's lamps: {lamps}")
-        elif found.worth:
-            samples = lamp_samples(scene, found.share)
-            lamps = f"{found.share:.0%} of the world's light, {samples} samples"
-            yield Progress(0.2, f"the world's lamps: {lamps}")
-            parts.append((yield from lamp_light(scene, field, found.lamps, samples, 0.3)))
-            environment, together = found.rest, found.share >= NEARLY_ALL
-        lap("lamps")
+    found = split(whole, None if field.hemicube.closed else field.hemicube)
+    parts, lamps, together = yield from _lamps(shown, found)
+    environment = found.rest if parts else whole
+    lap("lamps")
     yield Progress(0.5, "bringing the environment to the patches")
     light = PatchLight(environment, field.hemicube)
     lap("light")
     yield Progress(0.6, "relighting")
-    held = field.about.get("route") == SAMPLED
-    picture = relight_field(field, light, 0.0 if held else settings.own_lamps)
-    if held:
-        # light that only shadow rays bring: how much of it, Cycles lets hang on the whole world
-        region = region_of(field).slices
-        expected = yield from brightness(scene, field, whole, 0.65)
-        for rendered in parts:  # the lamps' light, which is Cycles' already
-            expected = np.maximum(expected - rendered[region].mean(axis=(0, 1)), 0)
-        found = picture[region][..., :3].mean(axis=(0, 1), dtype=np.float64)
-        picture[..., :3] *= np.divide(expected, found, out=np.ones(3), where=found > 0)
-        picture[..., :3] += np.float32(settings.own_lamps) * field.layer("own")
+    picture = relight_field(field, light, 0.0)
+    if shown.held:
+        yield from _hold(shown, whole, picture, parts)
+    picture[..., :3] += np.float32(settings.own_lamps) * shown.own
     parts.append(picture[..., :3])
     if together:
         parts = [sum(parts)]
@@ -126,8 +149,7 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     if settings.denoise:
         yield Progress(0.7, "denoising")
         if denoise.available():
-            clean = field.about.get("samples", 0) >= denoise.CLEAN_SAMPLES
-            parts = [denoise.denoise(denoise.guides_of(field), *parts, clean=clean)]
+            parts = [denoise.denoise(shown.guides, *parts, clean=denoise.clean(field), like=scene)]
             denoised = "Open Image Denoise"
         else:
             # said here, in the file's header and in the last line
@@ -139,19 +161,7 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     np.maximum(picture, 0, out=picture)
     if not scene.render.film_transparent:
         yield Progress(0.8, "adding the world behind")
-        captured = region_of(field)
-        if holds_out(scene, layer):
-            behind = background_with_holes(scene, captured, layer)
-            picture[..., :3] += behind[..., :3]
-            picture[..., 3] = behind[..., 3]
-        else:
-            # outside a render region Cycles leaves a picture empty
-            inside = picture[captured.slices]
-            rows, columns = np.nonzero(inside[..., 3] < OPAQUE)
-            if len(rows):
-                seen = Region.around(rows + captured.y, columns + captured.x)
-                there = background(scene, seen, layer, has_lamps)[captured.slices]
-                picture[captured.slices] = over(inside, there)
+        _behind(shown, lit, picture, found.worth)
         lap("background")
     yield Progress(0.9, f"writing {path}")
     about = {"scene": scene.name, "world": world.name, "denoised": denoised, "lamps": lamps}
@@ -160,7 +170,7 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
         about["glass"] = glass
         yield Progress(0.9, f"glass: {glass}")
     about |= {
-        "look": settings.look,
+        "look": lit.look,
         "world by rays": by_rays,
         "changed since capture": "; ".join(changed),
     }
@@ -168,4 +178,55 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     lap("write")
     say = f" (denoised: {denoised})" if settings.denoise else ""
     yield Progress(1.0, f"wrote {path}{say}")
-    return path, seconds
+    return seconds
+
+
+def _lamps(shown: Shown, found: Split) -> Steps:
+    """The light of the world's lamps, rendered by itself -> (pictures, none or one; what was done,
+    in words; whether they have nearly all the light)."""
+    settings, about = shown.scene.arto, shown.field.about
+    if not settings.lamps or not found.worth:
+        return [], "no", False
+    if not about.get("far", True):
+        lamps = "no: lamps at infinity would not stand where a near hemicube has them"
+    elif "view_layer" not in about:
+        lamps = "no: the field does not say of which view layer it is; capture again"
+    else:
+        samples = lamp_samples(shown.scene, found.share)
+        lamps = f"{found.share:.0%} of the world's light, {samples} samples"
+        yield Progress(0.2, f"the world's lamps: {lamps}")
+        light = yield from lamp_light(shown.scene, shown.field, found.lamps, samples, 0.3)
+        return [light], lamps, found.share >= NEARLY_ALL
+    yield Progress(0.3, f"the world's lamps: {lamps}")
+    return [], lamps, False
+
+
+def _hold(
+    shown: Shown, whole: Environment, picture: NDArray[np.float32], parts: list[NDArray]
+) -> Steps:
+    """Hold a picture to the brightness that a small render of its light has: of light that only
+    shadow rays bring, Cycles lets hang on the whole world how much of it there is."""
+    region = region_of(shown.field).slices
+    expected = yield from brightness(shown.scene, shown.field, whole, 0.65)
+    for rendered in parts:  # the lamps' light, which is Cycles' already
+        expected = np.maximum(expected - rendered[region].mean(axis=(0, 1)), 0)
+    found = picture[region][..., :3].mean(axis=(0, 1), dtype=np.float64)
+    picture[..., :3] *= np.divide(expected, found, out=np.ones(3), where=found > 0)
+
+
+def _behind(shown: Shown, lit: Light, picture: NDArray[np.float32], has_lamps: bool) -> None:
+    """Add the world as the camera sees it behind everything."""
+    scene, layer = shown.scene, shown.layer
+    captured = region_of(shown.field)
+    if holds_out(scene, layer):
+        behind = background_with_holes(scene, captured, layer, lit.world)
+        picture[..., :3] += behind[..., :3]
+        picture[..., 3] = behind[..., 3]
+        return
+    # outside a render region Cycles leaves a picture empty
+    inside = picture[captured.slices]
+    rows, columns = np.nonzero(inside[..., 3] < OPAQUE)
+    if len(rows):
+        seen = Region.around(rows + captured.y, columns + captured.x)
+        there = background(scene, seen, layer, has_lamps, lit.world)[captured.slices]
+        picture[captured.slices] = over(inside, there)

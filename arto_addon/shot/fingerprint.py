@@ -77,9 +77,19 @@ def fingerprint(
     if full:
         forget()
     layer = scene.view_layers[view_layer]
-    out: Fingerprint = {"Render settings": _settings(scene, layer)}
-    queue: list[bpy.types.ID] = [*_rendered(layer), *filter(None, [scene.camera])]
-    queue += filter(None, [layer.material_override])
+    roots: list[bpy.types.ID] = [*_rendered(layer), *filter(None, [scene.camera])]
+    roots += filter(None, [layer.material_override])
+    out = {"Render settings": _settings(scene, layer), **of_blocks(roots, then, full)}
+    out |= _worked_out(scene, layer)
+    return dict(sorted(out.items()))
+
+
+def of_blocks(
+    roots: Iterable[bpy.types.ID], then: Fingerprint | None = None, full: bool = False
+) -> Fingerprint:
+    """The fingerprint of some data-blocks and all that they point to; see `fingerprint`."""
+    then, out = then or {}, {}
+    queue = list(roots)
     seen = {block.session_uid for block in queue}
     while queue:
         block = queue.pop()
@@ -105,8 +115,7 @@ def fingerprint(
             if found.session_uid not in seen:
                 seen.add(found.session_uid)
                 queue.append(found)
-    out |= _worked_out(scene, layer)
-    return dict(sorted(out.items()))
+    return out
 
 
 def key_of(found: Fingerprint) -> str:

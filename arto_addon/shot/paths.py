@@ -224,6 +224,11 @@ def claim(scene: bpy.types.Scene, view_layer: str) -> Path:
     return folder
 
 
+def worlds_folder(scene: bpy.types.Scene) -> Path:
+    """Where maps of worlds are kept, for all shots."""
+    return _root(scene) / "worlds"
+
+
 def forget() -> None:
     """Look at the disk again."""
     _found.clear()

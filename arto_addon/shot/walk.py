@@ -199,7 +199,9 @@ def _properties(kind: type, rna: Any) -> list[tuple[str, str, bool]]:
         for prop in rna.properties:
             name = prop.identifier
             pointing = prop.type in {"POINTER", "COLLECTION"}
-            if name in _NEVER or name in _SCREEN or name in _DERIVED:
+            # a name that is chosen of a list is no name: the colour space of an image
+            chosen = name == "name" and prop.type == "ENUM"
+            if (name in _NEVER and not chosen) or name in _SCREEN or name in _DERIVED:
                 continue
             if name.startswith(("show_", "active_", "bl_")) and name not in _SCREEN_KEPT:
                 continue

@@ -31,7 +31,6 @@ SAMPLES, SEED, THROUGH = "the capture's samples", "the capture's seed", "as befo
 CHANGES = (
     Change("cycles.samples", SAMPLES, "its noise is the main error of the relit picture"),
     Change("cycles.seed", SEED, "all patterns share their paths"),
-    Change("cycles.use_animated_seed", False, "the same capture is the same again"),
     Change("cycles.use_layer_samples", "IGNORE", "the capture's samples count"),
     Change("cycles.use_sample_subset", False, "the capture's samples count"),
     Change("cycles.time_limit", 0.0, "every pixel has the same samples"),

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import bpy
 from numpy.typing import NDArray
 
 from ...core import exr
 from ..blender.output import write_to
 from ..work import Render, Steps
-from .stage import Stage, picture_region, picture_size
+from .stage import Pace, Stage, picture_region, picture_size
 
 # Pixels of a small render: its cost is the same for a picture of any size.
 PIXELS = 1728
@@ -45,7 +47,7 @@ def parts_of(on: Stage, text: str, share: float = 0.0) -> Steps:
 
     share: how far the whole work is.
     """
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, _timed(on):
         path = Path(folder) / "small.exr"
         write_to(on.scene.render, path)
         request = Render(on.scene.name, share, text)
@@ -53,3 +55,24 @@ def parts_of(on: Stage, text: str, share: float = 0.0) -> Steps:
         request.check()
         found: dict[str, NDArray] = exr.read(path)
         return found
+
+
+@contextmanager
+def _timed(on: Stage) -> Iterator[None]:
+    """Note on the stage what a render took: the scene's preparation, and its light paths."""
+    begun = time.perf_counter()
+    first: list[float] = []
+
+    def told(*arguments: object) -> None:
+        if not first and arguments and "Sample" in str(arguments[0]):
+            first.append(time.perf_counter())
+
+    bpy.app.handlers.render_stats.append(told)
+    try:
+        yield
+    finally:
+        bpy.app.handlers.render_stats.remove(told)
+    ended = time.perf_counter()
+    ready = first[0] if first else begun
+    paths = picture_region(on.scene).pixels * on.scene.cycles.samples
+    on.pace = Pace(ready - begun, (ended - ready) / paths)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
@@ -23,12 +24,21 @@ from ..blender.output import float_exr
 _KEEP_PASSES = {"use_pass_combined", "use_pass_z"}
 
 
+@dataclass(frozen=True)
+class Pace:
+    """How fast a stage renders. ready: seconds until the first path; path: seconds of one."""
+
+    ready: float
+    path: float
+
+
 class Stage:
     """The copied scene, and the data-blocks that live as long as it does."""
 
     def __init__(self, scene: bpy.types.Scene) -> None:
         self.scene = scene
         self.changed: dict[str, list[Any]] = {}
+        self.pace: Pace | None = None  # of the last small render
         self._made: list[bpy.types.ID] = []
 
     def made(self, block: Any) -> Any:

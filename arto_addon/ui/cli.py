@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import json
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -11,8 +13,10 @@ import bpy
 
 from ...core.errors import ArtoError, CancelledError
 from ..capture.capture import capture
+from ..capture.sequence import capture_frames
 from ..fit import fit
 from ..job import run as job
+from ..relight.many import relight_many
 from ..relight.relight import relight
 from ..shot import paths
 from ..work import ProgressLines, run
@@ -41,9 +45,40 @@ def _parser() -> argparse.ArgumentParser:
         one = jobs.add_parser(name, parents=[files], help=text)
         for setting in settings:
             _add_option(one, setting)
+        if name in ("capture", "relight"):
+            one.add_argument(
+                "--frames",
+                type=_frames,
+                default=None,
+                help="first and last frame, and a step: 1-24, 1-100:5 (capture: a field for each; "
+                "relight: a picture for each)",
+            )
+        if name == "capture":
+            one.add_argument(
+                "--estimate",
+                action="store_true",
+                help="say what it takes, as JSON in the last line, and render nothing long",
+            )
+        if name == "relight":
+            one.add_argument(
+                "--worlds", nargs="+", type=Path, help="environment maps, in the world's place"
+            )
+            one.add_argument(
+                "--turntable", type=int, default=1, help="so many pictures, turned once around"
+            )
     # what the window starts
     jobs.add_parser("job").add_argument("task", type=Path)
     return parser
+
+
+def _frames(text: str) -> range:
+    """`1-24`, `1-100:5`, `7`."""
+    match = re.fullmatch(r"(-?\d+)(?:-(-?\d+))?(?::(\d+))?", text)
+    first, last, step = match.groups() if match else ("0", "-1", "1")
+    found = range(int(first), int(last or first) + 1, int(step or 1) or 1)
+    if not found:
+        raise argparse.ArgumentTypeError(f"'{text}' is no frame range: write 1-24, or 1-100:5")
+    return found
 
 
 def _add_option(parser: argparse.ArgumentParser, name: str) -> None:
@@ -89,6 +124,8 @@ def main(arguments: list[str]) -> int:
     if options.get("faces"):
         options["faces"] = set(options["faces"])
         options["preset"] = "custom"
+    frames, estimate = options.pop("frames", None), options.pop("estimate", False)
+    worlds, turns = options.pop("worlds", None), options.pop("turntable", 1)
     for key, value in options.items():
         if value is not None:
             setattr(scene.arto, key, value)
@@ -105,8 +142,18 @@ def main(arguments: list[str]) -> int:
                 return 1
             print(f"ARTO adopt: {paths.adopt(scene, layer, place.source)}")
             return 0
-        work = {"capture": capture, "fit": fit, "relight": relight}[verb]
-        run(work(scene, layer), ProgressLines(verb))
+        if verb == "capture" and estimate:
+            work = capture(scene, layer, only_estimate=True)
+            print(json.dumps(run(work, ProgressLines(verb)).to_json()), flush=True)
+            return 0
+        if verb == "capture" and frames:
+            work = capture_frames(scene, layer, frames)
+        elif verb == "relight" and (worlds or frames or turns > 1):
+            files = [w.resolve() for w in worlds or ()]
+            work = relight_many(scene, layer, files, turns, frames or ())
+        else:
+            work = {"capture": capture, "fit": fit, "relight": relight}[verb](scene, layer)
+        run(work, ProgressLines(verb))
     except CancelledError as e:
         print(f"ARTO: {e}", file=sys.stderr)
         return 130

@@ -154,10 +154,27 @@ class ArtoSettings(bpy.types.PropertyGroup):
     seed: IntProperty(name="Seed", description="Seed of the capture's noise", min=0, default=0)
     memory: IntProperty(
         name="Memory (MB)",
-        description="Megabytes that the passes of one render may take; a larger picture is "
-        "captured in tiles",
-        min=16,
-        default=4096,
+        description="Megabytes that capturing and fitting may take beside Blender and the scene; a "
+        "larger picture is captured in tiles. 0: a sixth of the machine's memory",
+        min=0,
+        default=0,
+    )
+    keep: EnumProperty(
+        name="Keep Basis Images",
+        description="Whether what was rendered stays on disk once it is fitted",
+        items=[
+            ("never", "Never", "Each tile is fitted as it comes; the field is all that stays"),
+            ("fits", "If They Fit", "Keep them where they take no more than the limit"),
+            ("always", "Always", "Keep them: Fit is a step of its own, with any support"),
+        ],
+        default="never",
+    )
+    keep_limit: FloatProperty(
+        name="Limit (GB)",
+        description="Gigabytes of basis images that are kept where they fit",
+        min=0.0,
+        soft_max=1000.0,
+        default=4.0,
     )
     support: EnumProperty(
         name="Support",
@@ -239,7 +256,9 @@ class ArtoSettings(bpy.types.PropertyGroup):
 HEMICUBE = (
     "preset", "faces", "half_sides", "patches", "adaptive", "align", "rotation", "far", "size",
 )  # fmt: skip
-CAPTURE = ("samples", "patterns", "grain", "route", "seed", "memory")
+CAPTURE = (
+    "samples", "patterns", "grain", "route", "seed", "memory", "keep", "keep_limit",
+)  # fmt: skip
 FIT = ("support", "separate")
 RELIGHT = (
     "own_lamps", "lamps", "lamp_samples", "denoise", "environment_width", "look", "output",

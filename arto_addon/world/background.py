@@ -61,6 +61,7 @@ def background(
     region: Region | None = None,
     view_layer: str | None = None,
     even: bool = False,
+    world: bpy.types.World | None = None,
 ) -> NDArray[np.float32]:
     """The world as the artist's camera sees it behind everything -> (H, W, 3).
 
@@ -68,9 +69,10 @@ def background(
     else the scene has are the scene's. region: all that is looked at, 0 outside (default:
     everything). Pixels get as many samples as they need, up to `BACKGROUND_SAMPLES`: next to none
     in an even sky, all on the rim of a sun; or all of them (`even`), for a world with lamps.
+    world: another than the view layer's.
     """
     layer = view_layer or layer_of(scene)
-    world = check_world(scene, layer)
+    world = world or check_world(scene, layer)
     width, height = picture_size(scene)
     region = region or Region(0, 0, width, height)
     out = np.zeros((height, width, 3), np.float32)
@@ -104,14 +106,17 @@ def holds_out(scene: bpy.types.Scene, view_layer: str) -> bool:
 
 
 def background_with_holes(
-    scene: bpy.types.Scene, region: Region, view_layer: str
+    scene: bpy.types.Scene,
+    region: Region,
+    view_layer: str,
+    world: bpy.types.World | None = None,
 ) -> NDArray[np.float32]:
     """What of the world is seen between the scene's things, and where it is opaque -> (H, W, 4).
 
     For a scene that holds out: premultiplied by what is not in front of the world, to be added to a
     plate; alpha is 0 in the holes, and outside the region.
     """
-    world = check_world(scene, view_layer)
+    world = world or check_world(scene, view_layer)
     width, height = picture_size(scene)
     out = np.zeros((height, width, 4), np.float32)
     with stage(scene, view_layer) as on:

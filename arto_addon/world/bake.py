@@ -136,15 +136,20 @@ def _coarser(environment: Environment, scale: int) -> Environment:
     return Environment((rows / scale).astype(np.float32))
 
 
-def bake(scene: bpy.types.Scene, width: int, view_layer: str | None = None) -> Environment:
+def bake(
+    scene: bpy.types.Scene,
+    width: int,
+    view_layer: str | None = None,
+    world: bpy.types.World | None = None,
+) -> Environment:
     """The light of a view layer's world as an equirectangular map, width x width/2, in the working
-    space.
+    space. world: another than the layer's.
 
     Every texel is the mean over itself, of as many samples as the world's own detail asks for: a
     disc of a tenth of a degree keeps its light to 1%. Raises SceneError for a world that is not
     there or lacks an image.
     """
-    world = check_world(scene, view_layer)
+    world = world or check_world(scene, view_layer)
     with studio_scene(scene, world, "ARTO World") as (studio, made):
         lens = bpy.data.cameras.new("ARTO Panorama")
         camera = bpy.data.objects.new("ARTO Panorama", lens)

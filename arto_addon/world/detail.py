@@ -74,6 +74,19 @@ def _above(node: Any, ends: set[str]) -> set[Any]:
     return found
 
 
+def values_only(node: Any, ends: set[Any]) -> bool:
+    """Whether what a node is given, down to the nodes `ends`, knows of no direction."""
+    found: set[Any] = set()
+    todo = [node]
+    while todo:
+        for socket in todo.pop().inputs:
+            for link in socket.links:
+                if link.from_node not in found | ends:
+                    found.add(link.from_node)
+                    todo.append(link.from_node)
+    return all(n.bl_idname in _VALUES for n in found)
+
+
 def _of_texture(node: Any) -> int:
     """The width of a map as fine as an environment texture, as its nodes turn it."""
     above = _above(node, set())

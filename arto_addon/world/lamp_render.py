@@ -40,6 +40,12 @@ def world_of(on: Stage, shown: Environment, group: str = "") -> Any:
     texture = nodes.new("ShaderNodeTexEnvironment")
     texture.image = image
     world.node_tree.links.new(texture.outputs["Color"], nodes["Background"].inputs["Color"])
+    if shown.turn:
+        mapping = nodes.new("ShaderNodeMapping")
+        mapping.inputs["Rotation"].default_value = (0, 0, shown.turn)
+        direction = nodes.new("ShaderNodeTexCoord").outputs["Generated"]
+        world.node_tree.links.new(direction, mapping.inputs["Vector"])
+        world.node_tree.links.new(mapping.outputs[0], texture.inputs["Vector"])
     world.lightgroup = group
     # left to itself, Cycles takes a second for a map of 4096; twice as fine as the light finds the
     # rims of its texels, which are blended

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 from arto.arto_addon import fit, work
-from arto.arto_addon.capture import capture
+from arto.arto_addon.capture import capture, planned
 from arto.arto_addon.shot import paths, status
 from arto.core import exr
 from arto.core.basis_images import GROUP
@@ -89,17 +89,17 @@ def test_tiles_make_the_same_picture(tmp_path):
     whole = captured(scene).read(0)
     # 38 passes of 24 bytes and 24 pixels a row: 16 MB hold it all, so ask for strips directly
     region = capture.picture_region(scene)
-    strips = capture.tiles_of(region, 30, 16)
+    strips = planned.tiles_of(region, 38 * 24, 16 << 20)
     assert strips == [region]
-    budget = capture.tiles_of
+    budget = planned.tiles_of
     try:
-        capture.tiles_of = lambda r, n, m: [
+        planned.tiles_of = lambda r, n, m: [
             type(r)(r.x, r.y, r.width, 7),
             type(r)(r.x, r.y + 7, r.width, r.height - 7),
         ]
         tiled = captured(scene)
     finally:
-        capture.tiles_of = budget
+        planned.tiles_of = budget
     parts = [tiled.read(i) for i in range(2)]
     albedo = np.concatenate([p.guides["albedo"] for p in parts])
     # edges of things sit in the same rows; the noise differs
@@ -110,12 +110,12 @@ def test_tiles_make_the_same_picture(tmp_path):
 
 def test_tiles_fit_the_budget(scene):
     region = type(capture.picture_region(scene))
-    tiles = capture.tiles_of(region(5, 3, 2000, 1000), 480, 256)
+    tiles = planned.tiles_of(region(5, 3, 2000, 1000), 488 * 24, 256 << 20)
     assert tiles[0].y == 3 and sum(t.height for t in tiles) == 1000
     assert all(a.y + a.height == b.y for a, b in itertools.pairwise(tiles))
     assert all(t.height * 2000 * 488 * 24 <= 256 * 2**20 for t in tiles)
     with pytest.raises(SceneError, match="memory budget"):
-        capture.tiles_of(region(0, 0, 100000, 10), 9000, 16)
+        planned.tiles_of(region(0, 0, 100000, 10), 9008 * 24, 16 << 20)
 
 
 def test_render_region(tmp_path):
@@ -153,7 +153,7 @@ def unfinished(scene):
 def test_cancelled_scene_is_as_before_and_goes_on(tmp_path, monkeypatch):
     scene = small_scene(tmp_path)
     monkeypatch.setattr(
-        capture, "tiles_of", lambda r, n, m: [type(r)(0, y, r.width, 6) for y in (0, 6, 12)]
+        planned, "tiles_of", lambda r, n, m: [type(r)(0, y, r.width, 6) for y in (0, 6, 12)]
     )
     before = snapshot()
     with pytest.raises(CancelledError, match="run it again"):
@@ -175,7 +175,7 @@ def test_cancelled_scene_is_as_before_and_goes_on(tmp_path, monkeypatch):
 def test_another_capture_does_not_go_on_with_it(tmp_path, monkeypatch):
     scene = small_scene(tmp_path)
     monkeypatch.setattr(
-        capture, "tiles_of", lambda r, n, m: [type(r)(0, y, r.width, 9) for y in (0, 9)]
+        planned, "tiles_of", lambda r, n, m: [type(r)(0, y, r.width, 9) for y in (0, 9)]
     )
     with pytest.raises(CancelledError):
         _interrupt_after(capture.capture(scene, "ViewLayer"), 1)

@@ -70,6 +70,10 @@ def principled(name):
 SEEN = {
     "colour": (lambda s: set_input("Glossy", "Roughness", 0.4), "Material 'Glossy'"),
     "group": (lambda s: set_value(0.7), "'Wear'"),
+    "colour space": (
+        lambda s: setattr(bpy.data.images["Texture"].colorspace_settings, "name", "Linear Rec.709"),
+        "Image 'Texture'",
+    ),
     "link": (
         lambda s: unlink("Matt"),
         "Material 'Matt'",
@@ -193,11 +197,11 @@ def test_relighting_a_changed_scene_says_so(tmp_path):
 
 def test_a_capture_goes_on_only_with_what_it_began_with(tmp_path, monkeypatch):
     """Stopped, the scene changed: a new one begins. Changed back, the old one goes on."""
-    from arto.arto_addon.capture import capture
+    from arto.arto_addon.capture import capture, planned
 
     scene = small_scene(tmp_path)
     monkeypatch.setattr(
-        capture, "tiles_of", lambda r, n, m: [type(r)(0, y, r.width, 9) for y in (0, 9)]
+        planned, "tiles_of", lambda r, n, m: [type(r)(0, y, r.width, 9) for y in (0, 9)]
     )
 
     def tiles_rendered():

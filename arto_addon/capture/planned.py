@@ -1,0 +1,106 @@
+"""What is decided before the first long render: patches, their route, tiles, and whether there is
+room for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...core.basis_images import GRAIN
+from ...core.choice import check as check_choice
+from ...core.hemicube import Hemicube
+from ...core.patterns import pattern_set
+from ...core.refine import check as can_refine
+from ...core.region import Region
+from ..stage.stage import Stage
+from ..work import Progress, Steps
+from . import room
+from .light_check import check_light
+from .plan import SAMPLED, render_plan, tiles_of
+from .probe import refined
+from .room import Estimate
+
+# How many times as many patches as the grid has the probe may hand out.
+ADAPTIVE_SHARE = 2
+
+
+@dataclass(frozen=True)
+class Given:
+    """What was looked at before, for all frames of a shot: the patches, whole, and how light gets
+    to them; caution: see `check_light`."""
+
+    hemicube: Hemicube
+    route: str
+    caution: dict[str, Any] | None
+
+
+@dataclass(frozen=True)
+class Planned:
+    """What a capture will be, before its first long render."""
+
+    hemicube: Hemicube
+    route: str
+    grain: bool
+    kept: bool
+    caution: dict[str, Any] | None
+    tiles: list[Region]
+    estimate: Estimate
+
+
+def planned(
+    scene: bpy.types.Scene,
+    on: Stage,
+    hemicube: Hemicube,
+    region: Region,
+    grain: bool,
+    folder: Path,
+    given: Given | None,
+) -> Steps:
+    """Look at the scene, by small renders -> `Planned`. Raises SceneError where there is no room
+    for it."""
+    settings = scene.arto
+    if given:
+        route, caution = given.route, given.caution
+    else:
+        if settings.adaptive:
+            can_refine(hemicube)  # before anything is rendered
+        route, caution = yield from light_route(on, hemicube)
+        if settings.adaptive and route != SAMPLED:
+            hemicube = yield from refined(on, hemicube, ADAPTIVE_SHARE * len(hemicube))
+    grain = grain and route == "all"
+    names = [*pattern_set(settings.patterns).patterns, *([GRAIN] if grain else [])]
+    plan = [len(images) for images in render_plan(route, hemicube, names)]
+    budget = room.budget(settings.memory)
+
+    def estimated(kept: bool) -> tuple[list[Region], Estimate]:
+        bytes_a_pixel = room.bytes_a_pixel(max(plan), len(hemicube), not kept)
+        tiles = tiles_of(region, bytes_a_pixel, budget)
+        seconds = None
+        if on.pace:
+            renders = len(plan) * len(tiles)
+            paths_traced = region.pixels * settings.samples * len(plan)
+            seconds = renders * on.pace.ready + paths_traced * on.pace.path
+        return tiles, room.estimate(plan, tiles, len(hemicube), not kept, seconds)
+
+    kept = settings.keep != "never"
+    tiles, estimate = estimated(kept)
+    if settings.keep == "fits" and estimate.kept > settings.keep_limit * 1e9:
+        kept = False
+        check_choice(settings.support, pattern_set(settings.patterns), settings.separate)
+        tiles, estimate = estimated(kept)
+    yield Progress(0.0, f"this capture: {estimate.line}")
+    room.check_disk(folder, estimate.disk, "this capture")
+    return Planned(hemicube, route, grain, kept, caution, tiles, estimate)
+
+
+def light_route(on: Stage, hemicube: Hemicube) -> Steps:
+    """How light gets to the patches -> (route, what the artist is told, see `check_light`)."""
+    settings = on.scene.arto
+    if not settings.far:
+        # a near hemicube is no world: what it lights differs by what it is near to
+        return settings.route, None
+    sampled, caution = yield from check_light(on, hemicube)
+    return (SAMPLED if sampled else settings.route), caution

@@ -1,0 +1,128 @@
+"""Room: the memory that a capture may take, the disk that it needs, and how long it will be."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from ...core.errors import SceneError
+from ...core.region import Region
+from ..job.task import clock
+
+# Of the machine's memory, what the chain may take where the artist does not say: Blender, the scene
+# and the rest of the machine have the others.
+SHARE = 1 / 6
+LEAST_MEGABYTES = 512
+# Bytes of a pixel: of a layer on disk; of each light group in Cycles' and in Blender's buffers; of
+# a patch while it is fitted; of what was fitted; of the layers that are no groups.
+ON_DISK = 12
+PER_PASS = 24
+PER_PATCH = 4
+FITTED = 700
+OTHER_PASSES = 8
+# Of a field on disk, with the layers that belong to it: of a pixel, and of each patch in it, about.
+FIELD, FIELD_PATCH = 42, 1.5
+# Of a disk, what is left to others.
+SPARE = 200 << 20
+
+
+def machine_memory() -> int:
+    """Bytes of memory that the machine has."""
+    if sys.platform == "win32":
+        import ctypes
+
+        class Status(ctypes.Structure):
+            _fields_ = (
+                ("length", ctypes.c_uint32), ("load", ctypes.c_uint32),
+                *((n, ctypes.c_uint64) for n in ("total", "free", "p", "q", "r", "s", "t")),
+            )  # fmt: skip
+
+        status = Status()
+        status.length = ctypes.sizeof(Status)
+        ctypes.windll.kernel32.GlobalMemoryStatusEx(ctypes.byref(status))
+        return int(status.total)
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+
+
+def budget(megabytes: int) -> int:
+    """Bytes that capture and fit may take; megabytes: what the artist says, 0 for a share."""
+    if megabytes:
+        return megabytes << 20
+    return max(LEAST_MEGABYTES << 20, int(machine_memory() * SHARE))
+
+
+def bytes_a_pixel(passes: int, patches: int, fitted: bool) -> int:
+    """Memory that a pixel of a tile takes while the tile is rendered and, where captures are fitted
+    as they come, the last one is fitted."""
+    fit = patches * PER_PATCH + FITTED if fitted else 0
+    return (passes + OTHER_PASSES) * PER_PASS + fit
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a capture will take. seconds: None where nothing was rendered yet to tell by; memory,
+    disk (while it runs), kept (after it): bytes."""
+
+    seconds: float | None
+    memory: int
+    disk: int
+    kept: int
+    renders: int
+
+    def to_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+    @property
+    def line(self) -> str:
+        """In words."""
+        time = f"about {clock(self.seconds)}, " if self.seconds is not None else ""
+        return (
+            f"{time}{size(self.disk)} of disk while it runs, keeps {size(self.kept)}, "
+            f"{size(self.memory)} of memory"
+        )
+
+
+def size(number: float) -> str:
+    """Bytes in few words: `3.9 GB`."""
+    return f"{number / 1e9:.1f} GB" if number >= 1e9 else f"{number / 1e6:.0f} MB"
+
+
+def estimate(
+    plan: list[int],
+    tiles: list[Region],
+    patches: int,
+    fitted: bool,
+    seconds: float | None = None,
+) -> Estimate:
+    """plan: how many images each render of a tile has; fitted: whether tiles are fitted as they
+    come, and their images go."""
+    layers = sum(n + OTHER_PASSES for n in plan)
+    largest = max(t.pixels for t in tiles)
+    everything = sum(t.pixels for t in tiles)
+    field = round(everything * (FIELD + patches * FIELD_PATCH))
+    images = everything * layers * ON_DISK
+    in_flight = min(2, len(tiles)) * largest * layers * ON_DISK
+    return Estimate(
+        seconds=seconds,
+        memory=largest * bytes_a_pixel(max(plan), patches, fitted),
+        disk=in_flight + field if fitted else images,
+        kept=field if fitted else images,
+        renders=len(plan) * len(tiles),
+    )
+
+
+def check_disk(folder: Path, needed: int, what: str) -> None:
+    """Raise SceneError where a folder's disk has not the room."""
+    there = folder
+    while not there.exists():
+        there = there.parent
+    free = shutil.disk_usage(there).free
+    if free < needed + SPARE:
+        raise SceneError(
+            f"{what} needs {size(needed)} of disk, and {folder} has {size(free)} free: make room, "
+            "choose another folder in ARTO's settings, or let Keep Basis Images be Never"
+        )

@@ -1,0 +1,108 @@
+"""An animated shot: a field for each frame, in the light of the same patches (paper 9).
+
+The patches are those that the first, the middle and the last frame need together, around all that
+the three of them show: what two frames differ by is then what moved, and not how it was looked at.
+The noise of each frame is that of the artist's own render, whose rule for seeds is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...core.errors import SceneError
+from ...core.patterns import pattern_set
+from ...core.refine import check as can_refine
+from ...core.refine import refine
+from ..stage.bounds import rendered
+from ..stage.settings import prepare
+from ..stage.stage import stage
+from ..work import Progress, Render, Steps
+from . import planes, probe
+from .capture import capture
+from .check import check_scene
+from .plan import SAMPLED
+from .planned import ADAPTIVE_SHARE, Given, light_route
+
+
+@contextmanager
+def frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
+    """Put the scene back to its frame at the end."""
+    frame, part = scene.frame_current, scene.frame_subframe
+    try:
+        yield
+    finally:
+        scene.frame_set(frame, subframe=part)
+
+
+def capture_frames(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> Steps:
+    """Capture some frames of a shot, each with its field; returns their folders.
+
+    Frames that are there already, captured in the same way, are captured again: `capture` tells
+    them from what was stopped. Raises what `capture` raises, SceneError for no frames; the scene is
+    put back to the frame that it had.
+    """
+    if not frames:
+        raise SceneError("there are no frames to capture: give a first and a last one")
+    folders: list[Path] = []
+    with frame_kept(scene):
+        given = yield from _together(scene, view_layer, frames)
+        for i, frame in enumerate(frames):
+            scene.frame_set(frame)
+            steps = capture(scene, view_layer, given=given)
+            folders.append((yield from _as_part(steps, i, len(frames), f"frame {frame}: ")))
+    yield Progress(1.0, f"captured {len(frames)} frames, {len(given.hemicube)} patches each")
+    return folders
+
+
+def _as_part(steps: Steps, part: int, parts: int, title: str) -> Steps:
+    """The steps of one of so many pieces of work, told as a part of the whole."""
+    try:
+        while True:
+            step = next(steps)
+            step.share, step.text = (part + step.share) / parts, title + step.text
+            if isinstance(step, Render):
+                step.span /= parts
+            yield step
+    except StopIteration as end:
+        return end.value
+    finally:
+        steps.close()
+
+
+def _together(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> Steps:
+    """The patches of all frames -> `Given`."""
+    some = sorted({frames[0], frames[len(frames) // 2], frames[-1]})
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for frame in some:
+        scene.frame_set(frame)
+        check_scene(scene, view_layer)
+        with stage(scene, view_layer) as on:
+            seen = rendered(on)
+        seen.check()
+        low, high = np.minimum(low, seen.low), np.maximum(high, seen.high)
+    seen.low, seen.high = low, high
+    settings = scene.arto
+    hemicube = planes.wanted(scene, *seen.bounds())
+    if settings.adaptive:
+        can_refine(hemicube)
+    route, caution, probes = settings.route, None, []
+    for frame in some:
+        scene.frame_set(frame)
+        with stage(scene, view_layer) as on:
+            prepare(on, layers=len(pattern_set(settings.patterns)) + settings.grain)
+            here, told = yield from light_route(on, hemicube)
+            route = SAMPLED if here == SAMPLED else route
+            caution = caution or told
+            if settings.adaptive and route != SAMPLED:
+                found = yield from probe.probed(on, hemicube)
+                probes.append(found.reshape(len(found), 1, -1, 3))
+    if probes and route != SAMPLED:
+        every = np.concatenate(probes, axis=2)
+        most = ADAPTIVE_SHARE * len(hemicube)
+        hemicube = refine(hemicube, every, probe.SAMPLES, most)
+    return Given(hemicube, route, caution)

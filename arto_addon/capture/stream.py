@@ -1,0 +1,88 @@
+"""The stream: each tile is fitted while Cycles renders the next, and its basis images go.
+
+The fit is numpy's and Cycles lets go of Python's lock, so a thread does it. What the thread meets
+is raised where the capture next looks at it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from pathlib import Path
+from typing import Any
+
+from ...core.capture_set import CaptureSet
+from ...core.errors import CancelledError
+from ...core.field_writer import TileWriter, write_tile
+from ...core.fit import fit_tile
+
+
+class Stream:
+    """Fits tiles of an unfinished capture set into `field` in its folder, one at a time."""
+
+    FIELD = "field"
+
+    def __init__(self, folder: Path, choice: str, separate: bool) -> None:
+        self.folder, self.choice, self.separate = folder, choice, separate
+        self._thread: threading.Thread | None = None
+        self._stop = threading.Event()
+        self._entry: dict[str, Any] | None = None
+        self._error: BaseException | None = None
+        self._number = 0
+        self.share = 0.0
+
+    def start(self, number: int) -> None:
+        """Begin with a tile, which the set's description says to be there."""
+        captured = CaptureSet(self.folder, unfinished=True)
+        self._number, self.share, self._entry, self._error = number, 0.0, None, None
+
+        def work() -> None:
+            try:
+                self._entry = self._fit(captured, number)
+            except BaseException as e:
+                self._error = e
+
+        self._thread = threading.Thread(target=work, name=f"ARTO fits tile {number}")
+        self._thread.start()
+
+    def _fit(self, captured: CaptureSet, number: int) -> dict[str, Any] | None:
+        with captured.open(number) as data:
+            for step in fit_tile(
+                data,
+                captured.patterns,
+                captured.hemicube,
+                self.choice,
+                captured.samples,
+                self.separate,
+            ):
+                if self._stop.is_set():
+                    raise CancelledError("cancelled")
+                if isinstance(step, TileWriter):
+                    (self.folder / self.FIELD).mkdir(exist_ok=True)
+                    return write_tile(self.folder / self.FIELD, number, step)
+                self.share = step
+        raise AssertionError("a fit ends with its tile")
+
+    def ended(self, patience: float | None) -> tuple[int, dict[str, Any]] | None:
+        """The tile that was fitted, and its entry in `field.json`; None where none is, or not
+        within so many seconds. Raises what the fit met."""
+        if self._thread is None:
+            return None
+        self._thread.join(patience)
+        if self._thread.is_alive():
+            return None
+        self._thread = None
+        if self._error:
+            raise self._error
+        assert self._entry is not None
+        return self._number, self._entry
+
+    @property
+    def busy(self) -> bool:
+        return self._thread is not None
+
+    def stop(self) -> None:
+        """End at the next patch; what was not written is fitted anew by who goes on."""
+        self._stop.set()
+        with contextlib.suppress(BaseException):
+            self.ended(None)

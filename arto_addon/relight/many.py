@@ -1,0 +1,162 @@
+"""Many lights at once: files of worlds, a turntable, frames. What hangs on no light is shared."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...core.errors import CaptureSetError, SceneError
+from ...core.shot import Shot, safe_name
+from ..capture.sequence import frame_kept
+from ..shot import paths
+from ..shot.shot import check_same_shot, shot_of
+from ..work import Progress, Steps
+from ..world.check import check_world
+from .relight import Light, Shown, show
+
+
+def relight_many(
+    scene: bpy.types.Scene,
+    view_layer: str,
+    worlds: Sequence[Path] = (),
+    turns: int = 1,
+    frames: Sequence[int] = (),
+) -> Steps:
+    """Show a shot in many lights; returns the paths of the pictures.
+
+    worlds: environment maps to take in the place of the scene's world; turns: so many pictures of
+    each, turned about the vertical from one to the next, once around; frames: of an animated world,
+    or of the shot where its frames were captured. Pictures are named after map, and numbered by
+    turn or frame. Raises what `relight.compute` raises; the scene is put back to its frame.
+    """
+    if turns > 1 and frames:
+        raise SceneError("a turntable is of one frame: leave one of the two out")
+    scene.view_layers[view_layer].update()
+    base = paths.relit_file(scene)
+    done: list[Path] = []
+    total = max(len(worlds), 1) * max(turns, len(frames), 1)
+    still = None if frames else _shown(scene, view_layer, None)
+    with frame_kept(scene):
+        for frame in frames or [scene.frame_current]:
+            if frames:
+                scene.frame_set(frame)
+                scene.view_layers[view_layer].update()
+                still = _shown(scene, view_layer, still)
+            for file in worlds or [None]:
+                for turn in range(turns):
+                    number = frame if frames else turn + 1 if turns > 1 else None
+                    with ExitStack() as lent:
+                        world = None
+                        if file:
+                            world = lent.enter_context(_world_of(file))
+                        if turns > 1:
+                            source = world or check_world(scene, view_layer)
+                            angle = 2 * math.pi * turn / turns
+                            world = lent.enter_context(turned(source, angle))
+                        path = _named(base, file, number)
+                        text = f"picture {len(done) + 1} of {total}: {path.name}"
+                        yield Progress(len(done) / total, text)
+                        assert still is not None
+                        look = file.stem if file else scene.arto.look
+                        for step in show(still, Light(path, look, world)):
+                            # said once for all would be lost among them
+                            if not isinstance(step, Progress):
+                                step.share = len(done) / total
+                                yield step
+                    done.append(path)
+    yield Progress(1.0, f"wrote {len(done)} pictures, the last one {done[-1]}")
+    return done
+
+
+def _named(base: Path, file: Path | None, number: int | None) -> Path:
+    """The name of one of many pictures: `shot_sunset_0001.exr`."""
+    parts = [base.stem, *([safe_name(file.stem)] if file else [])]
+    parts += [f"{number:04d}"] if number is not None else []
+    return base.with_name("_".join(parts) + ".exr")
+
+
+def _shown(scene: bpy.types.Scene, view_layer: str, still: Shown | None) -> Shown:
+    """The field of the scene's frame; where none was captured, that of the still before it."""
+    folder = paths.field_folder(scene, view_layer)
+    if folder.exists():
+        found = Shown(scene, view_layer, folder)
+        check_same_shot(scene, found.field.about.get("shot"), "the reflectance field", view_layer)
+        return found
+    now = shot_of(scene, view_layer)
+    near = paths.nearest(scene, view_layer)
+    if still is None and near is None:
+        return Shown(scene, view_layer)  # which says what to do
+    if still is None:
+        assert near is not None
+        with frame_kept(scene):
+            scene.frame_set(near.frame)
+            still = Shown(scene, view_layer, paths.field_folder(scene, view_layer))
+    then = still.field.about.get("shot")
+    was = Shot.from_json(then) if then else now
+    if difference := replace(was, frame=now.frame, subframe=now.subframe).difference(now):
+        raise CaptureSetError(
+            f"frame {now.frame} was not captured, and differs from frame {was.frame} by "
+            f"{difference}: capture it too (--frames)"
+        )
+    return still
+
+
+@contextmanager
+def _world_of(file: Path) -> Iterator[Any]:
+    """A world that shows an environment map from a file. Raises SceneError."""
+    if not file.is_file():
+        raise SceneError(f"there is no environment map {file}")
+    made: list[Any] = []
+    try:
+        try:
+            image = bpy.data.images.load(str(file))
+        except RuntimeError as e:
+            raise SceneError(f"{file} cannot be read ({e}): choose an HDRI") from e
+        made.append(image)
+        world = bpy.data.worlds.new(file.stem)
+        made.append(world)
+        nodes = world.node_tree.nodes
+        texture = nodes.new("ShaderNodeTexEnvironment")
+        texture.image = image
+        world.node_tree.links.new(texture.outputs[0], nodes["Background"].inputs["Color"])
+        yield world
+    finally:
+        bpy.data.batch_remove(made)
+
+
+@contextmanager
+def turned(world: bpy.types.World, angle: float) -> Iterator[Any]:
+    """A copy of a world, turned about the vertical by so many radians, as its Mapping node would.
+
+    Raises SceneError for one that is not turned by one node.
+    """
+    copy = world.copy()
+    try:
+        for block in (copy, copy.node_tree):
+            if block:
+                block.animation_data_clear()
+        nodes = copy.node_tree.nodes
+        textures = [n for n in nodes if n.bl_idname == "ShaderNodeTexEnvironment"]
+        mappings = [n for n in nodes if n.bl_idname == "ShaderNodeMapping"]
+        if len(textures) == 1 and not mappings and not textures[0].inputs["Vector"].is_linked:
+            mapping = nodes.new("ShaderNodeMapping")
+            source = nodes.new("ShaderNodeTexCoord")
+            copy.node_tree.links.new(source.outputs["Generated"], mapping.inputs["Vector"])
+            copy.node_tree.links.new(mapping.outputs[0], textures[0].inputs["Vector"])
+        elif len(mappings) == 1 and not mappings[0].inputs["Rotation"].is_linked:
+            mapping = mappings[0]
+        else:
+            raise SceneError(
+                f"the world '{world.name}' is not turned by one Mapping node before its texture: "
+                "add one, or give maps by --worlds"
+            )
+        mapping.inputs["Rotation"].default_value[2] += angle
+        yield copy
+    finally:
+        bpy.data.worlds.remove(copy)
