@@ -139,9 +139,12 @@ def _snapshot(options: argparse.Namespace) -> None:
 
 
 def _settings(options: argparse.Namespace) -> None:
-    from .settings import run, table
+    from .settings import page, run, table
 
-    print(table(run(options.json, options.part, options.seed, options.only)))
+    rows = run(options.json, options.part, options.seed, options.only)
+    if options.page:
+        options.page.write_text(page(rows), encoding="utf-8")
+    print(table(rows))
 
 
 def _changes(options: argparse.Namespace) -> None:
@@ -153,12 +156,14 @@ def _changes(options: argparse.Namespace) -> None:
 
 
 def _field(options: argparse.Namespace) -> None:
-    from .field import field, table
+    from .field import field, page, table
 
     rows = []
     for row in field(options.json, options.only):
         rows.append(row)
         print(row["case"], row["status"], row["text"], flush=True)
+    if options.page:
+        options.page.write_text(page(rows), encoding="utf-8")
     print(table(rows))
 
 
@@ -240,6 +245,7 @@ def main() -> int:
     c.add_argument("--part", type=float, default=1.0, help="a random share of them, 0 to 1")
     c.add_argument("--seed", type=int, default=0, help="which share")
     c.add_argument("--only", nargs="+", help="owners, or owner.setting")
+    c.add_argument("--page", type=Path, help="of the docs, to write")
     c.set_defaults(run=_settings)
 
     c = commands.add_parser("changes", help="what a capture changes, as a page of the docs")
@@ -249,6 +255,7 @@ def main() -> int:
     c = commands.add_parser("field", help="scenes and worlds as artists bring them")
     c.add_argument("--json", type=Path)
     c.add_argument("--only", nargs="+", help="cases that begin so")
+    c.add_argument("--page", type=Path, help="of the docs, to write")
     c.set_defaults(run=_field)
 
     c = commands.add_parser("patterns", help="what each set of patterns can identify")

@@ -27,6 +27,8 @@ from .field_cases import CASES
 
 SIZE = (64, 48)
 SAMPLES, MANY = 128, 384
+# Times as many samples of a capture whose mean is looked at again.
+FINE = 16
 # Over a denoised render of the same samples, and of the ratio of the means.
 BEHIND, BIAS = 0.02, 0.01
 
@@ -53,6 +55,17 @@ def _cycles(
         bpy.data.scenes.remove(copy)
 
 
+def _relit(scene: bpy.types.Scene, folder: Path) -> tuple[np.ndarray, dict[str, Any]]:
+    """Capture, fit, relight -> the plate (H, W, 3), and what the capture set says. Raises
+    ArtoError."""
+    scene.arto.folder, scene.arto.output = str(folder / "arto"), str(folder / "relit.exr")
+    layer = scene.view_layers[0].name
+    there = work.run(capture.capture(scene, layer))
+    work.run(fit.fit(scene, layer))
+    path, _ = work.run(relight.relight(scene, layer))
+    return next(iter(exr.read(path).values()))[..., :3], CaptureSet(there).head
+
+
 def one(name: str, hdri: str = "sunset") -> dict[str, Any]:
     """A case, relit and measured."""
     base, change = CASES[name]
@@ -63,47 +76,38 @@ def one(name: str, hdri: str = "sunset") -> dict[str, Any]:
     scene.arto.samples = SAMPLES
     row: dict[str, Any] = {"case": name, "status": "right", "text": ""}
     begun = time.perf_counter()
-    with tempfile.TemporaryDirectory() as temporary:
+    # of names that artists give: an umlaut, a percent sign, what Blender's own paths give a meaning
+    with tempfile.TemporaryDirectory(prefix="Größe 50%02d {x} #") as temporary:
         folder = Path(temporary)
-        scene.arto.folder, scene.arto.output = str(folder / "arto"), str(folder / "relit.exr")
-        layer = scene.view_layers[0].name
         try:
-            there = work.run(capture.capture(scene, layer))
-            work.run(fit.fit(scene, layer))
-            path, _ = work.run(relight.relight(scene, layer))
+            relit, head = _relit(scene, folder)
         except ArtoError as e:
             return row | {"status": "refused", "text": str(e).splitlines()[0]}
-        caution = CaptureSet(there).head.get("caution")
-        relit = next(iter(exr.read(path).values()))[..., :3]
         one, two = (_cycles(scene, MANY, seed, folder)[..., :3] for seed in (1, 2))
         rival = _cycles(scene, SAMPLES, 3, folder, denoise=True)[..., :3]
-        if relit.shape != one.shape:  # a render region
-            relit = relit[tuple(slice(*s) for s in _crop(scene))]
         truth = (one + two) / 2
         row["error"] = metrics.mean_relative_error(relit, truth)
         row["noise_floor"] = metrics.mean_relative_error(one, two)
         row["denoised_render"] = metrics.mean_relative_error(rival, truth)
         row["bias"] = float(relit.mean() / max(truth.mean(), 1e-9) - 1)
-    # what two renders of Cycles' own differ by says nothing
-    noisy = 2 * abs(float(one.mean() / max(two.mean(), 1e-9)) - 1)
-    if max(relit.mean(), truth.mean()) < 1e-5:  # nothing gets in, and nothing is seen
-        row["error"] = row["noise_floor"] = row["denoised_render"] = row["bias"] = 0.0
+        # what two renders of Cycles' own differ by says nothing
+        row["bias_of_noise"] = 2 * abs(float(one.mean() / max(two.mean(), 1e-9)) - 1)
+        if max(relit.mean(), truth.mean()) < 1e-5:  # nothing gets in, and nothing is seen
+            for figure in ("error", "noise_floor", "denoised_render", "bias", "bias_of_noise"):
+                row[figure] = 0.0
+        if abs(row["bias"]) > BIAS + row["bias_of_noise"]:
+            # a few samples have not found all the light yet, and a denoiser takes what stands out
+            scene.arto.samples, scene.arto.denoise = FINE * SAMPLES, False
+            relit, _ = _relit(scene, folder)
+            row["bias"] = float(relit.mean() / truth.mean() - 1)
+            row["text"] = f"bias: of {FINE * SAMPLES} samples, not denoised"
     good = row["error"] <= max(row["denoised_render"], row["noise_floor"]) + BEHIND
-    if not (good and abs(row["bias"]) < BIAS + noisy):
+    if not (good and abs(row["bias"]) < BIAS + row["bias_of_noise"]):
         row["status"] = "wrong"
-    row["bias_of_noise"] = noisy
-    if caution:
-        row |= {"status": f"{row['status']}, said", "text": caution["text"]}
+    if head.get("caution"):
+        row |= {"status": f"{row['status']}, said", "text": head["caution"]["text"]}
     row["seconds"] = time.perf_counter() - begun
     return row
-
-
-def _crop(scene: bpy.types.Scene) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Rows and columns of the scene's render region."""
-    from arto.arto_addon.stage.stage import picture_region
-
-    r = picture_region(scene)
-    return (r.y, r.y + r.height), (r.x, r.x + r.width)
 
 
 def field(out: Path | None, wanted: list[str] | None = None) -> Iterator[dict[str, Any]]:
@@ -137,3 +141,26 @@ def table(rows: list[dict[str, Any]]) -> str:
         said = r["status"] + (f": {r['text']}" if r["text"] else "")
         lines.append(f"| {r['case']} | {' | '.join(figures)} | {bias} | {said} |")
     return "\n".join(lines)
+
+
+def page(rows: list[dict[str, Any]]) -> str:
+    """docs/scenes.md."""
+    return "\n".join(
+        [
+            "# Scenes and worlds as artists bring them",
+            "",
+            f"Each case is one change of a small scene ({SIZE[0]}x{SIZE[1]}) or of its world. It",
+            f"is captured with {SAMPLES} samples, fitted, relit and held against Cycles' own",
+            f"picture of that very scene: the mean of two seeds of {MANY} samples, whose distance",
+            f"is the noise floor. Beside it, Cycles' denoised render of {SAMPLES} samples. Errors",
+            "are mean relative errors, bias is the ratio of the means less one. Right is what is",
+            f"within {BEHIND} of the denoised render with a bias of at most {BIAS:.0%}, beside",
+            "twice what the two seeds differ by; where a bias is larger it is looked at again with",
+            f"{FINE} times as many samples and no denoiser, which tells noise from a fault. Paths",
+            "have an umlaut, a percent sign, braces and a hash in them. (`python -m bench field",
+            "--json FILE --page docs/scenes.md`.)",
+            "",
+            table(rows),
+            "",
+        ]
+    )

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+import tempfile
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import bmesh
 import bpy
 import numpy as np
+from arto.core import exr
 from mathutils import Matrix
 
 from .building import add_aimed
@@ -67,6 +70,8 @@ def orthographic(scene):
 def panoramic(scene):
     scene.camera.data.type = "PANO"
     scene.camera.data.panorama_type = "EQUIRECTANGULAR"
+    # a sun is far smaller than a pixel of a smaller one
+    scene.render.resolution_x, scene.render.resolution_y = 256, 128
 
 
 @case()
@@ -297,3 +302,54 @@ def a_pixel_that_is_no_number(scene):
 @case()
 def a_pixel_that_is_negative(scene):
     _with_pixel(scene, -3.0)
+
+
+def _as_file(scene: bpy.types.Scene, name: str, write: Callable[[Path, np.ndarray], None]) -> None:
+    """The world's picture from a file of another kind; write: (path, (H, W, 3) top-down)."""
+    texture = next(n for n in scene.world.node_tree.nodes if "Environment" in n.bl_idname)
+    width, height = texture.image.size
+    pixels = np.empty(width * height * 4, np.float32)
+    texture.image.pixels.foreach_get(pixels)
+    path = Path(tempfile.mkdtemp()) / name
+    write(path, pixels.reshape(height, width, 4)[::-1, :, :3])
+    texture.image = bpy.data.images.load(str(path))
+    texture.image.colorspace_settings.name = "Linear Rec.709"
+
+
+@case()
+def a_map_of_the_kind_hdr(scene):
+    def write(path: Path, pixels: np.ndarray) -> None:
+        height, width = pixels.shape[:2]
+        image = bpy.data.images.new("hdr", width, height, float_buffer=True)
+        rgba = np.ones((height, width, 4), np.float32)
+        rgba[..., :3] = pixels[::-1]
+        image.pixels.foreach_set(rgba.ravel())
+        image.filepath_raw, image.file_format = str(path), "HDR"
+        image.save()
+
+    _as_file(scene, "map.hdr", write)
+
+
+@case()
+def a_map_of_half_floats(scene):
+    _as_file(scene, "map.exr", lambda path, p: exr.write(path, {"": p.astype(np.float16)}))
+
+
+@case()
+def a_map_of_16k(scene):
+    def write(path: Path, pixels: np.ndarray) -> None:
+        large = pixels.astype(np.float16).repeat(16, axis=0).repeat(16, axis=1)
+        exr.write(path, {"": large})
+
+    _as_file(scene, "map.exr", write)
+
+
+@case()
+def a_linked_library(scene):
+    path = Path(tempfile.mkdtemp()) / "library.blend"
+    thing = scene.objects["glossy"]
+    bpy.data.libraries.write(str(path), {thing})
+    bpy.data.objects.remove(thing)
+    with bpy.data.libraries.load(str(path), link=True) as (_, wanted):
+        wanted.objects = ["glossy"]
+    scene.collection.objects.link(wanted.objects[0])

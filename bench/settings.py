@@ -150,6 +150,8 @@ def _cycles(scene: bpy.types.Scene, seed: int, folder: Path) -> np.ndarray:
         write_to(copy.render, folder / "cycles.exr")
         for layer in list(copy.view_layers)[1:]:
             copy.view_layers.remove(layer)
+        # without any layer to render Blender as a module crashes
+        copy.view_layers[0].use = True
         request = work.Render(copy.name, 0, "")
         work.blocking_render(request)
         request.check()
@@ -235,6 +237,38 @@ def table(rows: list[dict[str, Any]]) -> str:
                 f"| {r['owner']} | {r['setting']} | {r['value']} | {r['status']} | {r['text']} |"
             )
     return "\n".join(lines)
+
+
+def page(rows: list[dict[str, Any]]) -> str:
+    """docs/settings.md, of the rows of a whole sweep."""
+    owners: dict[str, list[int]] = {}
+    for row in rows:
+        tried = owners.setdefault(row["owner"], [0, 0])
+        tried[0] += 1
+        tried[1] += row["status"] == "right"
+    return "\n".join(
+        [
+            "# Every setting, against Cycles",
+            "",
+            "Each property of a scene that decides a picture was set to its other values, one at a",
+            "time; the scene captured, fitted and relit under it; the picture held against Cycles'",
+            "own under that very setting, with two seeds. (`python -m bench settings --json FILE",
+            "--page docs/settings.md`; a random part of it is a test.)",
+            "",
+            f"Blender {bpy.app.version_string}, {len(rows)} tries: {table(rows)}",
+            "",
+            "| owner | tried | right |",
+            "|---|---|---|",
+            *(f"| {name} | {all_} | {right} |" for name, (all_, right) in owners.items()),
+            "",
+            "## What differs on purpose",
+            "",
+            "| owner | setting | why |",
+            "|---|---|---|",
+            *(f"| {o} | {s} | {why} |" for (o, s), why in sorted(ON_PURPOSE.items())),
+            "",
+        ]
+    )
 
 
 def run(out: Path | None, part: float, seed: int, wanted: list[str] | None) -> list[dict[str, Any]]:

@@ -142,6 +142,7 @@ scene = bpy.context.scene
 scene.arto.samples = int(sys.argv[-1])
 scene.render.resolution_x, scene.render.resolution_y = 100, 76
 scene.arto.memory, scene.arto.patches, scene.arto.adaptive = 16, 4, False
+scene.arto.keep = "always"
 bpy.ops.wm.save_mainfile()
 """
 
@@ -256,6 +257,7 @@ def test_edits_go_into_the_snapshot(open_window: Open, blend: Path) -> None:
         "image.pixels.foreach_set(np.tile([1, 0, 0, 1], 16).astype(np.float32))\n"
         "image.update()"
     )
+    w.do("bpy.context.scene.arto.keep = 'always'")
     w.press("capture")
     assert w.idle()[0] == "INFO"
     parts = basis(blend.parent / "arto")

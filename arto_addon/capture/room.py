@@ -26,8 +26,8 @@ FITTED = 700
 OTHER_PASSES = 8
 # Of a field on disk, with the layers that belong to it: of a pixel, and of each patch in it, about.
 FIELD, FIELD_PATCH = 42, 1.5
-# Of a disk, what is left to others.
-SPARE = 200 << 20
+# Of what is needed, how much more must be free.
+SPARE = 0.05
 
 
 def machine_memory() -> int:
@@ -121,7 +121,7 @@ def check_disk(folder: Path, needed: int, what: str) -> None:
     while not there.exists():
         there = there.parent
     free = shutil.disk_usage(there).free
-    if free < needed + SPARE:
+    if free < needed * (1 + SPARE):
         raise SceneError(
             f"{what} needs {size(needed)} of disk, and {folder} has {size(free)} free: make room, "
             "choose another folder in ARTO's settings, or let Keep Basis Images be Never"

@@ -35,6 +35,8 @@ from . import denoise, plate
 NEARLY_ALL = 0.9
 # Alpha from which on nothing is seen behind: the rounding of a mean of many ones.
 OPAQUE = 1 - 1e-5
+# A lamp of more than this share of the light is looked for behind the plate by every pixel.
+LEAST_SHARE = 1e-3
 # Fewer samples of the lamps than this have no time to smooth an edge.
 LEAST_SAMPLES = 4
 
@@ -161,7 +163,7 @@ def show(shown: Shown, lit: Light) -> Steps:
     np.maximum(picture, 0, out=picture)
     if not scene.render.film_transparent:
         yield Progress(0.8, "adding the world behind")
-        _behind(shown, lit, picture, found.worth)
+        _behind(shown, lit, picture, found.share > LEAST_SHARE)
         lap("background")
     yield Progress(0.9, f"writing {path}")
     about = {"scene": scene.name, "world": world.name, "denoised": denoised, "lamps": lamps}
