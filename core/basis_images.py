@@ -71,6 +71,14 @@ class TileData:
         """(P, h, w, 3)."""
         return self.basis[k]
 
+    def coefficient(self, k: int, patterns: PatternSet) -> NDArray[np.float32]:
+        """(h, w, 3), R of patch k."""
+        return patterns.coefficient(self.basis[k])
+
+    def images_at(self, k: int, pixels: NDArray[np.intp]) -> NDArray[np.float32]:
+        """(P, n, 3) of n pixels, by their numbers row by row."""
+        return self.basis[k].reshape(len(self.basis[k]), -1, 3)[:, pixels]
+
     def grain_of(self, k: int) -> NDArray[np.float32] | None:
         return None if self.grain is None else self.grain[k]
 
@@ -120,6 +128,20 @@ class BasisImages:
     def images(self, k: int) -> NDArray[np.float32]:
         """(P, h, w, 3), the images of patch k. Raises CaptureSetError for what bends the light."""
         total, *others = ((s.share, s.images(k)) for s in self._seeds)
+        return _mean(total, others)
+
+    def coefficient(self, k: int, patterns: PatternSet) -> NDArray[np.float32]:
+        """(h, w, 3), R of patch k: where one pattern shows it, the others are not read."""
+        which = patterns.shown_by
+        if which is None:
+            return patterns.coefficient(self.images(k))
+        name = patterns.patterns[which]
+        total, *others = ((s.share, s.image(k, name)) for s in self._seeds)
+        return _mean(total, others)
+
+    def images_at(self, k: int, pixels: NDArray[np.intp]) -> NDArray[np.float32]:
+        """(P, n, 3) of n pixels, by their numbers row by row; of images that were looked at."""
+        total, *others = ((s.share, s.images_at(k, pixels)) for s in self._seeds)
         return _mean(total, others)
 
     def grain_of(self, k: int) -> NDArray[np.float32] | None:
@@ -235,7 +257,25 @@ class _Seed:
         """(P, h, w, 3)."""
         out = np.empty((len(self.of.patterns), *self.of.shape, 3), np.float32)
         for image, name in zip(out, self.of.patterns.patterns, strict=True):
-            image[...] = self.image(k, name)
+            number, layer = self.there[k, name]
+            file = self.files[number]
+            if file.shape(layer) == image.shape and file.dtype(layer) == image.dtype:
+                file.read(layer, image)
+                if (k, name) not in self._looked:
+                    self._check(number, layer, image, image.shape)
+                    self._looked.add((k, name))
+            else:
+                self.image(k, name)  # which says what is wrong
+        return out
+
+    def images_at(self, k: int, pixels: NDArray[np.intp]) -> NDArray[np.float32]:
+        """(P, n, 3)."""
+        out = np.empty((len(self.of.patterns), len(pixels), 3), np.float32)
+        at = np.divmod(pixels, self.of.region.width)
+        for image, name in zip(out, self.of.patterns.patterns, strict=True):
+            number, layer = self.there[k, name]
+            for c, plane in enumerate(self.files[number].planes(layer)):
+                image[:, c] = plane[at]
         return out
 
     def add(self, k: int, images: NDArray, lit: NDArray) -> None:
@@ -276,11 +316,23 @@ class _Seed:
                 f"{say} is of {pixels.dtype}: half floats put a floor under small supports; "
                 "save it as 32-bit float, or capture again"
             )
-        # one pass that NaN fails too
-        if not (pixels.min() >= 0 and pixels.max() < np.inf):
+        # as whole numbers, what is negative is, and infinities and NaN are the largest: one pass
+        bits = pixels.view(np.int32) if pixels.flags.c_contiguous else None
+        if bits is None or not _within(bits.reshape(-1)):
             bad = ~(np.isfinite(pixels) & (pixels >= 0)).all(axis=-1)
+            if not bad.any():
+                return
             y, x = np.argwhere(bad)[0]
             raise CaptureSetError(
                 f"{say} has {int(bad.sum())} pixels that are negative, infinite or not a number, "
                 f"the first at ({x}, {y}): find the material there, and capture again"
             )
+
+
+_INFINITY = int(np.float32(np.inf).view(np.int32))
+
+
+def _within(bits: NDArray[np.int32]) -> bool:
+    """Whether floats, as the whole numbers of their bits, are from 0 up and finite: compared
+    without their signs, negative ones come after all others."""
+    return bool(bits.view(np.uint32).max(initial=0) < _INFINITY)

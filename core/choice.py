@@ -130,19 +130,39 @@ def choose(
     face; choice: `auto`, or one model for every pixel that gets light from the patch; separate:
     supports of each channel's own.
     """
-    codes = np.full(basis.shape[1], NOTHING, np.uint8)
+    lit = entries(choice, coefficient, known, k)
+    codes = np.full(len(coefficient), NOTHING, np.uint8)
+    codes[lit], found = choose_lit(choice, basis[:, lit], patterns, known, k, lit, extent, separate)
+    return codes, found
+
+
+def entries(choice: str, coefficient: NDArray, known: Evidence, k: int) -> NDArray[np.intp]:
+    """The pixels in which patch k is an entry under a choice; coefficient: (n, 3)."""
     if choice == "auto":
         # most entries are too dark to keep: what they see of their patch is not asked for, and
         # their light goes into the pixel's rest
-        lit = known.kept(k)
-        moments = Moments.from_basis(basis[:, lit], patterns, extent, separate)
-        codes[lit] = _smallest(moments, known.hits(k, lit))
+        return known.kept(k)
+    return np.flatnonzero((coefficient > 0).any(axis=-1))
+
+
+def choose_lit(
+    choice: str,
+    basis: NDArray,
+    patterns: PatternSet,
+    known: Evidence,
+    k: int,
+    pixels: NDArray[np.intp],
+    extent: Extent,
+    separate: bool = False,
+) -> tuple[NDArray[np.uint8], dict[int, NDArray]]:
+    """`choose` for those pixels of patch k that are `entries`; basis: (P, n, 3) of them."""
+    moments = Moments.from_basis(basis, patterns, extent, separate)
+    if choice == "auto":
+        codes = _smallest(moments, known.hits(k, pixels))
     else:
-        lit = np.flatnonzero((coefficient > 0).any(axis=-1))
-        moments = Moments.from_basis(basis[:, lit], patterns, extent, separate)
-        codes[lit] = SUPPORTS[choice].code
+        codes = np.full(len(pixels), SUPPORTS[choice].code, np.uint8)
     found: dict[int, NDArray] = {}
-    chosen = codes[lit]
+    chosen = codes.copy()
     for support in SUPPORTS.values():
         here = chosen == support.code
         if not here.any():
@@ -150,6 +170,6 @@ def choose(
         used: Support = support
         if separate and support.parameters:
             used = PER_CHANNEL[support.name]
-            codes[lit[here]] = used.code
+            codes[here] = used.code
         found[used.code] = used.fit(moments.select(here))
     return codes, found

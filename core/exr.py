@@ -151,20 +151,36 @@ class Layers:
     def names(self) -> list[str]:
         return list(self._layers)
 
-    def read(self, name: str) -> NDArray:
-        """A layer, (H, W, C)."""
-        return self._filled(name, self._planes(name))
+    def read(self, name: str, into: NDArray | None = None) -> NDArray:
+        """A layer, (H, W, C); into: an array of its shape to read it to."""
+        planes = self.planes(name)
+        if into is None:
+            return self._filled(name, planes)
+        for n, pixels in enumerate(planes):
+            into[..., n] = pixels
+        return into
+
+    def shape(self, name: str) -> tuple[int, int, int]:
+        """(H, W, C) of a layer."""
+        planes = self.planes(name)
+        height, width = planes[0].shape
+        return height, width, len(planes)
+
+    def dtype(self, name: str) -> np.dtype:
+        """What a layer's first channel is of."""
+        return self.planes(name)[0].dtype
 
     def take(self, name: str) -> NDArray:
         """A layer, (H, W, C), for the last time: it is never in memory twice."""
-        planes = self._planes(name)
+        planes = self.planes(name)
         if self._decoded:
             part, channels = self._layers[name]
             for channel in channels:
                 del self._decoded[part].channels[channel]
         return self._filled(name, planes)
 
-    def _planes(self, name: str) -> list[NDArray]:
+    def planes(self, name: str) -> list[NDArray]:
+        """The channels of a layer, each (H, W), where they lie: not to be kept or written to."""
         part, channels = self._layers[name]
         if not self._plain:
             return [self._decoded[part].channels[channel].pixels for channel in channels]

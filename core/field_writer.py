@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,12 +41,16 @@ class TileWriter:
         patterns that do not fit together can give, is no light. Raises FieldError for one that is
         no number.
         """
-        self._check(coefficient)
-        coefficient = np.maximum(coefficient, 0)
+        low, high = coefficient.min(initial=0), coefficient.max(initial=0)
+        if not (low > -np.inf and high < np.inf):  # which NaN fails too
+            self._refuse(coefficient)
+        if low < 0:
+            coefficient = np.maximum(coefficient, 0)
         # half floats are relative to the patch's brightest, so that any exposure fits them; that is
         # at their upper end, so that a firefly leaves nine decades below it their precision
-        scale = float(coefficient.max(initial=0)) / LARGEST or 1.0
-        dropped = np.flatnonzero((codes == NOTHING) & coefficient.any(axis=-1))
+        scale = float(high) / LARGEST or 1.0
+        lit = (coefficient[:, 0] > 0) | (coefficient[:, 1] > 0) | (coefficient[:, 2] > 0)
+        dropped = np.flatnonzero((codes == NOTHING) & lit)
         codes = codes.copy()
         codes[dropped] = REST
         self.rest[dropped] += coefficient[dropped]
@@ -58,10 +62,7 @@ class TileWriter:
             r.append((coefficient[codes == code] / scale).astype(np.float16))
             p.append(np.rint(np.clip(values, 0, 1) * 65535).astype(np.uint16))
 
-    def _check(self, coefficient: NDArray) -> None:
-        # one pass that NaN fails too
-        if -np.inf < coefficient.min(initial=0) and coefficient.max(initial=0) < np.inf:
-            return
+    def _refuse(self, coefficient: NDArray) -> NoReturn:
         bad = np.flatnonzero(~np.isfinite(coefficient).all(axis=-1))
         row, column = divmod(int(bad[0]), self.region.width)
         raise FieldError(

@@ -87,10 +87,17 @@ class PatternSet:
     def coefficient(self, basis: NDArray) -> NDArray:
         """The zeroth moment alone, the reflection coefficient: (P, ...) basis images -> (...)."""
         self.require((ONE,), "a reflection coefficient")
-        row = self._pseudo_inverse[ONE].astype(basis.dtype)
-        if row[0] == 1 and not np.abs(row[1:]).max(initial=0) > 1e-12:
-            return basis[0]
-        return np.tensordot(row, basis, axes=1)
+        if self.shown_by is not None:
+            return basis[self.shown_by]
+        return np.tensordot(self._pseudo_inverse[ONE].astype(basis.dtype), basis, axes=1)
+
+    @cached_property
+    def shown_by(self) -> int | None:
+        """The pattern whose basis image is the reflection coefficient itself; None where it takes
+        several."""
+        row = self._pseudo_inverse[ONE]
+        only = row[0] == 1 and not np.abs(row[1:]).max(initial=0) > 1e-12
+        return 0 if only and self.identified[ONE] else None
 
     def moments(self, basis: NDArray) -> NDArray:
         """Moments from basis images.
