@@ -11,16 +11,21 @@ from numpy.typing import NDArray
 
 from ...core import exr
 from ..shot import paths
+from .header import header
 
 IMAGE = "ARTO Relit"
 # The image node in a plate's group.
 SOURCE = "ARTO Relit"
 
 
-def write(path: Path, picture: NDArray[np.float32], about: dict[str, str]) -> None:
-    """Write the plate: (H, W, 4) scene-linear, premultiplied; the header names its colour space."""
+def write(
+    scene: bpy.types.Scene, path: Path, picture: NDArray[np.float32], about: dict[str, str]
+) -> None:
+    """Write the plate: (H, W, 4) scene-linear, premultiplied. The header names its colour space,
+    and has what Blender's own render of the scene would have in it."""
     space = bpy.data.colorspace.working_space
-    exr.write(path, {"": picture}, {f"arto.{k}": v for k, v in about.items()}, space)
+    attributes = header(scene) | {f"arto.{k}": v for k, v in about.items()}
+    exr.write(path, {"": picture}, attributes, space)
 
 
 def name_of(scene: bpy.types.Scene, look: str | None = None) -> str:
@@ -37,7 +42,9 @@ def present(scene: bpy.types.Scene, path: Path, look: str | None = None) -> bpy.
     """
     name = name_of(scene, look)
     image = show(path, name)
-    wire(scene, node_group(image, name))
+    if wire(scene, node_group(image, name)) is None:
+        tree = scene.compositing_node_group.name
+        print(f"ARTO: the compositor '{tree}' is linked and stays as it is: add '{name}' to it")
     if not bpy.app.background and bpy.context.window_manager.windows:
         bpy.ops.ed.undo_push(message="Relight")
     return image

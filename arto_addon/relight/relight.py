@@ -176,7 +176,7 @@ def show(shown: Shown, lit: Light) -> Steps:
         "world by rays": by_rays,
         "changed since capture": "; ".join(changed),
     }
-    plate.write(path, picture, {name: text for name, text in about.items() if text})
+    plate.write(scene, path, picture, {name: text for name, text in about.items() if text})
     lap("write")
     say = f" (denoised: {denoised})" if settings.denoise else ""
     yield Progress(1.0, f"wrote {path}{say}")

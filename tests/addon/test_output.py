@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import bpy
 import numpy as np
 import pytest
 from arto.arto_addon import fit, work
@@ -143,3 +144,29 @@ def test_a_stamp_is_not_burnt_into_the_light(tmp_path):
     scene.render.stamp_background = (1, 0, 1, 1)
     np.testing.assert_allclose(captured(scene).read(0).own, clean, atol=1e-5)
     np.testing.assert_allclose(background(scene), 0.0509, atol=1e-3)
+
+
+def test_the_header_says_what_blenders_own_does(tmp_path):
+    """Attribute by attribute, beside F12's file of the same scene; but for what a render took."""
+    scene = small_scene(tmp_path)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    r = scene.render
+    r.pixel_aspect_x, r.stamp_note_text = 1.5, "graded for dusk"
+    for flag in ("lens", "note", "marker", "hostname", "frame_range"):
+        setattr(r, f"use_stamp_{flag}", True)
+    r.use_stamp_camera = False
+    scene.timeline_markers.new("take 2", frame=1)
+    scene.frame_set(7)
+    captured(scene)
+    work.run(fit.fit(scene))
+    plate, _ = work.run(relight.relight(scene))
+    r.filepath, r.image_settings.file_format = str(tmp_path / "own.exr"), "OPEN_EXR"
+    scene.cycles.samples = 1
+    bpy.ops.render.render(write_still=True)
+    own, found = exr.header(tmp_path / "own.exr"), exr.header(plate)
+    told = [n for n in own if n[0].isupper() and n not in {"RenderTime", "Date"}]
+    assert {"File", "Lens", "Marker", "Note", "Frame", "Software"} <= set(told)
+    assert "Camera" not in own and "Camera" not in found
+    assert {n: found.get(n) for n in told} == {n: own[n] for n in told}
+    assert found["pixelAspectRatio"] == own["pixelAspectRatio"]
+    assert abs(len(found["Date"]) - len(own["Date"])) == 0

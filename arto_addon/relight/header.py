@@ -1,0 +1,42 @@
+"""What Blender writes into the header of a picture's EXR, for plates."""
+
+from __future__ import annotations
+
+import platform
+import time
+from typing import Any
+
+import bpy
+
+from ..shot import home
+
+
+def header(scene: bpy.types.Scene) -> dict[str, Any]:
+    """The attributes that Blender's own render of the scene would have, as the artist asks for them
+    (Output properties, Metadata); but for its render's time and memory, which there was none of."""
+    render = scene.render
+    camera, digits = scene.camera, len(str(max(scene.frame_end, 1)))
+    markers = [m for m in scene.timeline_markers if m.frame <= scene.frame_current]
+    marker = max(markers, key=lambda m: m.frame, default=None)
+    perspective = camera and camera.type == "CAMERA" and camera.data.type == "PERSP"
+    fields = {
+        "filename": ("File", home.file() or "<untitled>"),
+        "date": ("Date", time.strftime("%Y/%m/%d %H:%M:%S")),
+        "time": ("Time", bpy.utils.smpte_from_frame(scene.frame_current)),
+        "frame": ("Frame", f"{scene.frame_current:0{digits}d}"),
+        "frame_range": ("FrameRange", f"{scene.frame_start}:{scene.frame_end}"),
+        "camera": ("Camera", camera.name if camera else ""),
+        "lens": ("Lens", f"{camera.data.lens:.2f}" if perspective else ""),
+        "scene": ("Scene", scene.name),
+        "note": ("Note", render.stamp_note_text),
+        "marker": ("Marker", marker.name if marker else ""),
+        "hostname": ("Hostname", platform.node()),
+    }
+    found: dict[str, Any] = {
+        name: value
+        for flag, (name, value) in fields.items()
+        if value and getattr(render, f"use_stamp_{flag}")
+    }
+    found["Software"] = f"Blender {bpy.app.version_string}"
+    found["pixelAspectRatio"] = float(render.pixel_aspect_x / render.pixel_aspect_y)
+    return found
