@@ -162,9 +162,9 @@ def test_the_estimate_is_of_what_comes(tmp_path, monkeypatch):
 def test_a_full_disk_is_seen_before_the_first_render(tmp_path, monkeypatch):
     scene = small_scene(tmp_path)
     real = room.shutil.disk_usage
-    monkeypatch.setattr(room.shutil, "disk_usage", lambda p: real(p)._replace(free=1 << 20))
+    monkeypatch.setattr(room.shutil, "disk_usage", lambda p: real(p)._replace(free=1 << 10))
     rendered = []
-    with pytest.raises(SceneError, match=r"needs .* of disk, and .* has 1 MB free: make room"):
+    with pytest.raises(SceneError, match=r"needs .* of disk, and .* has 0 MB free: make room"):
         run(scene, lambda s: rendered.append(s) if "basis images" in s.text else None)
     assert not rendered
 
