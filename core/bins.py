@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +12,21 @@ from numpy.typing import NDArray
 from .environment import Environment, directions, sample_directions
 from .hemicube import Hemicube
 
-_CACHE: dict[tuple, tuple[NDArray, NDArray]] = {}
+# Samples of a map that are worked on at a time, and of one whose bins are kept.
+BLOCK = 1 << 20
+KEPT = 1 << 23
+_KEPT: dict[tuple, list[Samples]] = {}
+
+
+class Samples(NamedTuple):
+    """Some rows of a map's texels, sampled: which rows, how many samples a texel's side has, the
+    bin of each sample (rows * finer, columns * finer; -1: no patch), and the solid angle of one of
+    each row of samples."""
+
+    rows: slice
+    finer: int
+    bins: NDArray[np.int32]
+    weight: NDArray[np.float64]
 
 
 def default_resolution(hemicube: Hemicube, environment: Environment) -> NDArray[np.intp]:
@@ -25,35 +41,47 @@ def sample_bins(
     resolutions: NDArray,
     offsets: NDArray,
     turn: float = 0.0,
-) -> tuple[NDArray, NDArray]:
-    """Bin of every sample of a map of that size, turned by `turn` (-1: no patch), and each sample's
-    solid angle.
+) -> Iterator[Samples]:
+    """The bins of every sample of a map of that size, turned by `turn`, block by block.
 
-    The same for every map of a size, so the last one is kept: turning through HDRIs is common.
+    The same for every map of a size, so those of the last one are kept unless it is large: turning
+    through HDRIs is common.
     """
     key = (hemicube, height, width, resolutions.tobytes(), turn)
-    if key in _CACHE:
-        return _CACHE[key]
+    if key in _KEPT:
+        yield from _KEPT[key]
+        return
     # two samples a bin and axis on average; a narrow bin may still stay empty
     finer = max(1, int(np.ceil(8 * (resolutions * hemicube.sides).max() / width)))
     azimuth, latitude, weight = sample_directions(height, width, finer, turn)
-    # float64: float32 moves a sample on a patch's border to the other side
-    bins = np.empty((height * finer, width * finer), np.int32)
 
-    def fill(row: int) -> None:
-        k, u, v = hemicube.locate(directions(azimuth, latitude[row : row + 64]))
+    def fill(bins: NDArray, row: int) -> None:
+        # float64: float32 moves a sample on a patch's border to the other side
+        k, u, v = hemicube.locate(directions(azimuth, latitude[row : row + len(bins)]))
         r = resolutions[k].astype(np.int32)
         i = bin_coordinate(hemicube, k, u, 0, r).astype(np.int32)
         j = bin_coordinate(hemicube, k, v, 1, r).astype(np.int32)
         np.clip(i, 0, r - 1, out=i)
         np.clip(j, 0, r - 1, out=j)
-        bins[row : row + 64] = np.where(k < 0, -1, offsets[k] + j * r + i)
+        bins[:] = np.where(k < 0, -1, offsets[k] + j * r + i)
 
+    keep = [] if height * width * finer * finer <= KEPT else None
+    if keep is not None:
+        _KEPT.clear()
+    step = max(1, BLOCK // (width * finer * finer))
     with ThreadPoolExecutor() as pool:
-        list(pool.map(fill, range(0, len(latitude), 64)))
-    _CACHE.clear()
-    _CACHE[key] = (bins, weight)
-    return _CACHE[key]
+        for first in range(0, height, step):
+            rows = slice(first, min(first + step, height))
+            lines = slice(rows.start * finer, rows.stop * finer)
+            bins = np.empty((lines.stop - lines.start, width * finer), np.int32)
+            at = range(0, len(bins), 64)
+            list(pool.map(fill, [bins[i : i + 64] for i in at], [lines.start + i for i in at]))
+            block = Samples(rows, finer, bins, weight[lines])
+            if keep is not None:
+                keep.append(block)
+            yield block
+    if keep is not None:
+        _KEPT[key] = keep
 
 
 def bin_coordinate(

@@ -14,12 +14,13 @@ from . import choice as choices
 from .basis_images import BasisImages, TileData
 from .capture_set import CaptureSet
 from .evidence import evidence
-from .field_writer import FieldWriter, TileWriter
+from .field_writer import FieldWriter
 from .hemicube import Hemicube
 from .moments import Moments
 from .patterns import PatternSet
 from .search import search
 from .supports import BOX, NOTHING, WHOLE
+from .tile_writer import TileWriter
 
 # How much of the work on a tile the first pass over its images is, about.
 READING = 0.4

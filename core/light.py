@@ -13,7 +13,7 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
-from .bins import bin_coordinate, default_resolution, sample_bins
+from .bins import Samples, bin_coordinate, default_resolution, sample_bins
 from .environment import Environment
 from .hemicube import Hemicube
 from .patterns import monomials
@@ -38,21 +38,12 @@ class PatchLight:
         self._offsets = _starts(self.resolutions**2)
         self._tables = _starts((self.resolutions + 1) ** 2)
         height, width = environment.image.shape[:2]
-        bins, weight = sample_bins(
-            hemicube, height, width, self.resolutions, self._offsets, environment.turn
-        )
-        finer = bins.shape[0] // height
-        lit = bins.ravel() >= 0
-        index = bins.ravel()[lit]
-        solid_angle = np.repeat(weight, bins.shape[1])[lit]
-        size = int(self._offsets[-1])
         # flux and solid angle side by side: one look-up fetches all four
-        self._flat = flat = np.empty((size, 4))
-        flat[:, 3] = np.bincount(index, solid_angle, size)
-        for c in range(3):
-            texels = environment.image[..., c]
-            samples = np.repeat(np.repeat(texels, finer, axis=0), finer, axis=1).ravel()[lit]
-            flat[:, c] = np.bincount(index, samples * solid_angle, size)
+        self._flat = np.zeros((int(self._offsets[-1]), 4))
+        for some in sample_bins(
+            hemicube, height, width, self.resolutions, self._offsets, environment.turn
+        ):
+            self._collect(environment.image[some.rows], some)
         self._fill_empty(environment)
         self._lock = Lock()
         self._polynomials: dict[tuple[int, ...], NDArray[np.float64]] = {}
@@ -61,6 +52,17 @@ class PatchLight:
             table = self._sat[self._tables[k] : self._tables[k + 1]].reshape(r + 1, r + 1, 4)
             np.cumsum(self.bins_of(k), axis=0, out=table[1:, 1:])
             np.cumsum(table[1:, 1:], axis=1, out=table[1:, 1:])
+
+    def _collect(self, texels: NDArray, some: Samples) -> None:
+        """Add some rows of the map to the bins."""
+        lit = some.bins.ravel() >= 0
+        index = some.bins.ravel()[lit]
+        solid_angle = np.repeat(some.weight, some.bins.shape[1])[lit]
+        np.add.at(self._flat[:, 3], index, solid_angle)
+        for c in range(3):
+            samples = np.repeat(texels[..., c], some.finer, axis=0)
+            samples = np.repeat(samples, some.finer, axis=1).ravel()[lit]
+            np.add.at(self._flat[:, c], index, samples * solid_angle)
 
     @property
     def resolution(self) -> int:

@@ -29,3 +29,10 @@ class Region:
     @property
     def slices(self) -> tuple[slice, slice]:
         return slice(self.y, self.y + self.height), slice(self.x, self.x + self.width)
+
+    def overlap(self, other: Region) -> Region | None:
+        """What is in both; None for nothing."""
+        x, y = max(self.x, other.x), max(self.y, other.y)
+        right = min(self.x + self.width, other.x + other.width)
+        bottom = min(self.y + self.height, other.y + other.height)
+        return Region(x, y, right - x, bottom - y) if right > x and bottom > y else None

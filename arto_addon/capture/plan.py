@@ -14,6 +14,10 @@ from .planes import MOST_SAMPLED
 SAMPLED = "sampled"
 
 
+# Rows of the picture that tiles begin at, where they are not too thin: those of all proxies.
+ALIGNED = 8
+
+
 def tiles_of(region: Region, bytes_a_pixel: int, budget: int) -> list[Region]:
     """Cut a region into strips that fit a budget, in bytes."""
     row = region.width * bytes_a_pixel
@@ -25,6 +29,11 @@ def tiles_of(region: Region, bytes_a_pixel: int, budget: int) -> list[Region]:
         )
     count = -(-region.height // rows)
     edges = [region.height * i // count for i in range(count + 1)]
+    if count > 1 and rows >= 4 * ALIGNED:
+        # a pixel of a proxy must not be of two tiles
+        count = -(-region.height // (rows - ALIGNED))
+        edges = [region.height * i // count for i in range(count + 1)]
+        edges[1:-1] = [e + -(region.y + e) % ALIGNED for e in edges[1:-1]]
     return [
         Region(region.x, region.y + a, region.width, b - a) for a, b in itertools.pairwise(edges)
     ]

@@ -13,8 +13,9 @@ from typing import Any
 
 from ...core.capture_set import CaptureSet
 from ...core.errors import CancelledError
-from ...core.field_writer import TileWriter, write_tile
+from ...core.field_writer import write_tile
 from ...core.fit import fit_tile
+from ...core.tile_writer import TileWriter
 
 
 class Stream:
@@ -59,7 +60,7 @@ class Stream:
                     raise CancelledError("cancelled")
                 if isinstance(step, TileWriter):
                     (self.folder / self.FIELD).mkdir(exist_ok=True)
-                    return write_tile(self.folder / self.FIELD, number, step)
+                    return write_tile(self.folder / self.FIELD, number, step, captured.hemicube)
                 self.share = step
         raise AssertionError("a fit ends with its tile")
 

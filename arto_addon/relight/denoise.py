@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from ...core import exr
 from ...core.field import Field
-from ...core.field_writer import write_head, write_layer
+from ...core.field_writer import write_head
+from ...core.tile_writer import write_layer
 from ..blender.output import float_exr, write_to
 from ..work import Progress, Render, Steps, blocking_render
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
+import numpy as np
 from numpy.typing import NDArray
 
 from ..light import PatchLight
@@ -29,4 +30,11 @@ class Support(Protocol):
 
     def average(self, light: PatchLight, k: int, parameters: NDArray) -> NDArray:
         """<S, L>: the light of patch k averaged over the supports (n, p) -> (n, 3) radiance."""
+        ...
+
+    def plane(
+        self, light: PatchLight, k: int
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
+        """What `average` is where it is linear in the parameters: a constant (3,), and slopes
+        (3, p) along them. None where it is not."""
         ...

@@ -28,3 +28,6 @@ class Box:
     def average(self, light: PatchLight, k: int, parameters: NDArray) -> NDArray:
         u0, u1, v0, v1 = parameters.astype(np.float64).T
         return light.box(k, u0, u1, v0, v1)
+
+    def plane(self, light: PatchLight, k: int) -> None:
+        return None

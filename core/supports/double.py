@@ -65,6 +65,9 @@ class Double:
         share = share[:, None]
         return share * light.box(k, u0, u1, v0, v1) + (1 - share) * light.whole[k]
 
+    def plane(self, light: PatchLight, k: int) -> None:
+        return None
+
 
 def _share(product: NDArray, covariance: NDArray, base: float) -> NDArray:
     """The share x in covariance = (1 - x) (base + product / x): 1 where nothing tells it.

@@ -24,5 +24,9 @@ class Linear:
         return np.stack(moments.mean, axis=-1)
 
     def average(self, light: PatchLight, k: int, parameters: NDArray) -> NDArray:
-        a, *slopes = light.polynomial((ONE, U, V))[k].astype(np.float32)
-        return parameters.astype(np.float32) @ np.stack(slopes) + a
+        constant, slopes = self.plane(light, k)
+        return parameters.astype(np.float32, copy=False) @ slopes.T + constant
+
+    def plane(self, light: PatchLight, k: int) -> tuple[NDArray, NDArray]:
+        constant, *slopes = light.polynomial((ONE, U, V))[k].astype(np.float32)
+        return constant, np.stack(slopes, axis=-1)

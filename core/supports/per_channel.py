@@ -38,3 +38,6 @@ class PerChannel:
             ],
             axis=-1,
         )
+
+    def plane(self, light: PatchLight, k: int) -> None:
+        return None

@@ -24,5 +24,9 @@ class Quadratic:
         return moments.normalised[[U, UU, V, VV]].T
 
     def average(self, light: PatchLight, k: int, parameters: NDArray) -> NDArray:
-        constant, *rest = light.polynomial(self.needs)[k].astype(np.float32)
-        return parameters.astype(np.float32) @ np.stack(rest) + constant
+        constant, slopes = self.plane(light, k)
+        return parameters.astype(np.float32, copy=False) @ slopes.T + constant
+
+    def plane(self, light: PatchLight, k: int) -> tuple[NDArray, NDArray]:
+        constant, *slopes = light.polynomial(self.needs)[k].astype(np.float32)
+        return constant, np.stack(slopes, axis=-1)

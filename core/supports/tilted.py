@@ -85,6 +85,9 @@ class _Tilted:
                 weight += w
         return total / weight
 
+    def plane(self, light: PatchLight, k: int) -> None:
+        return None
+
 
 class OrientedBox(_Tilted):
     name = "oriented_box"

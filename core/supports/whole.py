@@ -20,3 +20,6 @@ class Whole:
 
     def average(self, light: PatchLight, k: int, parameters: NDArray) -> NDArray:
         return np.broadcast_to(light.whole[k], (len(parameters), 3))
+
+    def plane(self, light: PatchLight, k: int) -> tuple[NDArray, NDArray]:
+        return light.whole[k].astype(np.float32), np.zeros((3, 0), np.float32)

@@ -10,10 +10,12 @@ from arto.core.capture_set import CaptureSet
 from arto.core.choice import BROAD, CHOICES, check, choose
 from arto.core.errors import FieldError, PatternError
 from arto.core.evidence import DROPPED, SUN, Evidence, evidence
+from arto.core.field_tile import Tile
 from arto.core.fit import fit_tile
 from arto.core.hemicube import Hemicube
 from arto.core.patterns import PatternSet, pattern_set
 from arto.core.supports import BOX, BY_CODE, LINEAR, NOTHING, REST, SUPPORTS, WHOLE
+from arto.core.tile_writer import TileWriter
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -189,7 +191,10 @@ def test_what_is_dropped_of_a_tile_stays_under_its_share(
         made = scene(Hemicube(patches=2), shape, patterns, seed, unlit=0.9)
         data = CaptureSet(write_scene(tmp_path / f"{seed}", made)).read(0)
         *_, tile = fit_tile(data, made.patterns, made.hemicube, "auto")
-        kept = ~np.isin(np.stack(tile.codes), (NOTHING, REST))
+        assert isinstance(tile, TileWriter)
+        folder = tmp_path / f"tile_{seed}"
+        written = Tile(folder, data.region, tile.write(folder), len(made.hemicube))
+        kept = ~np.isin(written.codes, (NOTHING, REST))
         size = made.coefficient.sum(axis=-1).reshape(kept.shape)
         dropped = np.where(kept, 0, size).sum(axis=0)
         assert (dropped <= 1.01 * DROPPED * size.sum(axis=0)).all()

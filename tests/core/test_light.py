@@ -367,8 +367,28 @@ def test_a_map_of_another_size_or_cube_is_not_mistaken(noisy, monkeypatch) -> No
     for cube in cubes:
         for e in maps:
             for binned, r in zip(next(again), (4, 8), strict=True):
-                monkeypatch.setattr("arto.core.bins._CACHE", {})
+                monkeypatch.setattr("arto.core.bins._KEPT", {})
                 np.testing.assert_array_equal(binned, PatchLight(e, cube, r).binned)
+
+
+def test_the_bins_of_a_large_map_are_worked_out_in_blocks(noisy, monkeypatch) -> None:
+    """They are not kept, and no array of all its samples is made: the light is the same to the
+    order of a sum, which is that of the rows in both."""
+    from arto.core import bins
+
+    cube, environment = Hemicube(patches=3), noisy(4, 64)
+    whole = PatchLight(environment, cube)
+    assert len(bins._KEPT) == 1
+    sizes = []
+    real = PatchLight._collect
+    monkeypatch.setattr(
+        PatchLight, "_collect", lambda s, t, some: sizes.append(some.bins.size) or real(s, t, some)
+    )
+    monkeypatch.setattr(bins, "BLOCK", 3000)
+    monkeypatch.setattr(bins, "KEPT", 0)
+    monkeypatch.setattr(bins, "_KEPT", {})
+    np.testing.assert_array_equal(PatchLight(environment, cube).binned, whole.binned)
+    assert max(sizes) <= 3000 and sum(sizes) == 64 * 128 * 4 and not bins._KEPT
 
 
 def test_a_thin_box_at_the_rim_sees_the_bin_there(noisy) -> None:

@@ -1,0 +1,233 @@
+"""One tile of a reflectance field on disk: what each patch gives to each of its pixels.
+
+A coefficient is stored in eight bits as the root of its share of the pixel's largest: its error is
+then in proportion to the root of the light, as the noise of any capture is, and under a thirtieth
+of it at 128 samples a pixel. Whose entry it is, is a bit for each pixel, patch and model in use.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import FieldError
+from .region import Region
+from .supports import BY_CODE, NOTHING, REST, Support
+
+# The arrays of a tile stand block after block: so many pixels at a time, row by row. A block is
+# what a thread adds up and what a crop reads; whole bytes of bits.
+BLOCK = 1 << 17
+# The largest code of a coefficient: that of the pixel's largest, channel by channel.
+FULL = 255
+# Where half floats are relative to a largest value, that is at their upper end: nine decades below
+# it keep their precision.
+LARGEST = 6e4
+# Beside the models' arrays, what relighting reads.
+OTHERS = ("peaks", "scales", "rest", "rest_weights", "rest_patches")
+
+
+@dataclass(frozen=True)
+class Entries:
+    """The entries of one patch that share a support model.
+
+    pixels: (n,) indices into the tile, row by row; coefficient: (n, 3) R; parameters: (n, p).
+    """
+
+    support: Support
+    pixels: NDArray[np.intp]
+    coefficient: NDArray[np.float32]
+    parameters: NDArray[np.float32]
+
+
+def blocks_of(pixels: int) -> list[slice]:
+    """The blocks of a tile."""
+    return [slice(a, min(a + BLOCK, pixels)) for a in range(0, pixels, BLOCK)]
+
+
+def steps_of(support: Support) -> np.dtype:
+    """How finely a model's parameters are stored: means of many paths in 8 bits, edges in 16."""
+    return np.dtype(np.uint8 if support.name == "linear" else np.uint16)
+
+
+class Model:
+    """The entries of one support model in a tile: (3, m) codes of R, (p, m) parameters.
+
+    They stand in the order of (block, patch, pixel); counts: (B, K) of them; bits: for each block
+    and patch that has any, a bit for each pixel of the block.
+    """
+
+    def __init__(self, tile: Tile, support: Support, count: int) -> None:
+        self.tile, self.support = tile, support
+        name, p = support.name, len(support.parameters)
+        blocks = tile.blocks
+        counts = tile.load(f"{name}_counts", (len(blocks), tile.patches), np.uint32)
+        lengths = np.array([b.stop - b.start for b in blocks])[:, None]
+        if (counts > lengths).any() or counts.sum(dtype=np.int64) != count:
+            raise FieldError(f"{tile.folder} is damaged, its counts differ: fit again")
+        self.counts = counts
+        self.starts = _starts(counts)
+        row = np.where(counts > 0, -(-lengths // 8), 0)
+        self.rows = _starts(row)
+        self.codes = tile.load(f"{name}_coefficient", (3, count), np.uint8)
+        self.parameters = tile.load(f"{name}_parameters", (p, count), steps_of(support))
+        self.bits = tile.load(f"{name}_pixels", (int(row.sum()),), np.uint8)
+        # parameters are in [0, 1], of which this is the end
+        self.end = np.float32(np.iinfo(self.parameters.dtype).max)
+
+    def has(self, block: int, k: int) -> bool:
+        return bool(self.counts[block, k])
+
+    def at(self, block: int, k: int) -> slice:
+        """The columns of `codes` and `parameters` of patch k in a block."""
+        a = self.starts[block, k]
+        return slice(a, a + int(self.counts[block, k]))
+
+    def pixels(self, block: int, k: int) -> NDArray[np.intp]:
+        """Their pixels, counted from the block's first."""
+        where = self.tile.blocks[block]
+        n = where.stop - where.start
+        first = self.rows[block, k]
+        found = np.flatnonzero(
+            np.unpackbits(self.bits[first : first + -(-n // 8)], count=n).view(bool)
+        )
+        if len(found) != self.counts[block, k]:
+            raise FieldError(f"{self.tile.folder} is damaged, its counts differ: fit again")
+        return found
+
+    def shares(self, at: slice) -> NDArray[np.float32]:
+        """(3, n) of R, relative to that whose code is 1."""
+        out = self.codes[:, at].astype(np.float32)
+        out *= out
+        return out
+
+    def parameters_of(self, at: slice) -> NDArray[np.float32]:
+        """(n, p) in [0, 1]."""
+        out = self.parameters[:, at].astype(np.float32)
+        out /= self.end
+        return out.T
+
+
+def _starts(sizes: NDArray) -> NDArray[np.int64]:
+    """Where each of some runs begins, that stand in the order of (block, patch)."""
+    ends = np.cumsum(sizes, dtype=np.int64)
+    return (ends - sizes.ravel()).reshape(sizes.shape)
+
+
+class Tile:
+    """One tile of an opened field; arrays stay on disk until asked for."""
+
+    def __init__(self, folder: Path, region: Region, used: dict[str, int], patches: int) -> None:
+        self.folder, self.region, self.used, self.patches = folder, region, used, patches
+        self.blocks = blocks_of(region.pixels)
+
+    def load(self, name: str, shape: tuple[int, ...], dtype: np.dtype | type) -> NDArray:
+        """One of the tile's arrays, mapped. Raises FieldError unless it is as described."""
+        out = self._load(name)
+        if out.shape != shape or out.dtype != dtype:
+            raise FieldError(
+                f"{self.folder / name}.npy has the shape {out.shape} of {out.dtype}, not {shape} "
+                f"of {np.dtype(dtype)}: fit again"
+            )
+        return out
+
+    def _load(self, name: str) -> NDArray:
+        path = self.folder / f"{name}.npy"
+        try:
+            return np.load(path, mmap_mode="r")
+        except (OSError, ValueError, EOFError) as e:
+            raise FieldError(f"{path} is missing or damaged ({e}): fit again") from e
+
+    def layer(
+        self, name: str, part: tuple[slice, slice] = (slice(None), slice(None))
+    ) -> NDArray[np.float32]:
+        """One of `field.LAYERS`, (h, w, ...), float32; part: of its rows and columns."""
+        out = self._load(name)
+        if out.shape[:2] != (self.region.height, self.region.width):
+            raise FieldError(f"{self.folder / name}.npy has the wrong size: fit again")
+        return out[part].astype(np.float32)
+
+    def has_layer(self, name: str) -> bool:
+        return (self.folder / f"{name}.npy").is_file()
+
+    @cached_property
+    def models(self) -> list[Model]:
+        """The support models in use, in the order of their codes."""
+        found = {s.name: s for s in BY_CODE.values()}
+        for name in self.used:
+            if name not in found:
+                raise FieldError(
+                    f"{self.folder} uses the support model '{name}', which this version does "
+                    "not know: update ARTO, or fit again"
+                )
+        supports = sorted((found[name] for name in self.used), key=lambda s: s.code)
+        return [Model(self, support, self.used[support.name]) for support in supports]
+
+    @cached_property
+    def _scales(self) -> NDArray[np.float32]:
+        """(2,): the units of `peaks` and `rest`."""
+        return np.asarray(self.load("scales", (2,), np.float32))
+
+    @cached_property
+    def _peaks(self) -> NDArray[np.float16]:
+        return self.load("peaks", (self.region.pixels, 3), np.float16)
+
+    def ones(self, pixels: slice) -> NDArray[np.float32]:
+        """(n, 3): the R whose code is 1 in each pixel."""
+        return self._peaks[pixels].astype(np.float32) * (self._scales[0] / FULL**2)
+
+    @cached_property
+    def rest_weights(self) -> NDArray[np.float32] | None:
+        """(K,): how much of each patch is in the rest of the tile; None where there is no rest."""
+        if not (self.folder / "rest.npy").is_file():
+            return None
+        return np.asarray(self.load("rest_weights", (self.patches,), np.float32))
+
+    @cached_property
+    def _rest(self) -> NDArray[np.float16]:
+        return self.load("rest", (self.region.pixels, 3), np.float16)
+
+    def rest(self, pixels: slice = slice(None)) -> NDArray[np.float32]:
+        """(n, 3): R of all that was too small to be an entry, added up."""
+        return self._rest[pixels].astype(np.float32) * self._scales[1]
+
+    @cached_property
+    def rest_patches(self) -> NDArray[np.uint8]:
+        """(ceil(K / 8), n): a bit for each patch that a pixel's rest is of, the first the least."""
+        return self.load("rest_patches", (-(-self.patches // 8), self.region.pixels), np.uint8)
+
+    def open(self) -> None:
+        """Map all that relighting needs. Raises FieldError."""
+        _ = self.models, self._scales, self._peaks
+        if self.rest_weights is not None:
+            _ = self._rest, self.rest_patches
+
+    @property
+    def codes(self) -> NDArray[np.uint8]:
+        """(K, n): which model each entry has; 0 for no light, `REST` for light in the rest only."""
+        out = np.full((self.patches, self.region.pixels), NOTHING, np.uint8)
+        if self.rest_weights is not None:
+            bits = np.unpackbits(self.rest_patches, axis=0, count=self.patches, bitorder="little")
+            out[bits.astype(bool)] = REST
+        for model in self.models:
+            for block, where in enumerate(self.blocks):
+                for k in np.flatnonzero(model.counts[block]).tolist():
+                    out[k, where.start + model.pixels(block, k)] = model.support.code
+        return out
+
+    def entries(self, k: int) -> list[Entries]:
+        """The entries of patch k, model by model."""
+        found = []
+        for model in self.models:
+            here = [b for b in range(len(self.blocks)) if model.has(b, k)]
+            if not here:
+                continue
+            pixels = np.concatenate([self.blocks[b].start + model.pixels(b, k) for b in here])
+            shares = np.concatenate([model.shares(model.at(b, k)).T for b in here])
+            ones = self._peaks[pixels].astype(np.float32) * (self._scales[0] / FULL**2)
+            parameters = np.concatenate([model.parameters_of(model.at(b, k)) for b in here])
+            found.append(Entries(model.support, pixels, shares * ones, parameters))
+        return found

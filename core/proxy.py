@@ -1,0 +1,132 @@
+"""Proxies: a field at a half, a quarter and an eighth of its size, for previews and thumbnails.
+
+A pixel of a proxy is the mean of those that it covers. Coefficients and moments add up, so where
+supports are moments its picture is the mean of the picture's pixels, exactly; of boxes, what covers
+them all is kept where most of the light is theirs. A field of other models has none.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .hemicube import Hemicube
+from .measure import box_averages, box_of
+from .patterns import UU, VV, U, V
+from .region import Region
+from .supports import BOX, LINEAR, WHOLE
+from .tile_writer import TileWriter
+
+FACTORS = (2, 4, 8)
+
+
+def proxies(tile: TileWriter, hemicube: Hemicube, first: bool = True) -> dict[int, TileWriter]:
+    """The proxies of a tile, by how many pixels a side one of theirs covers.
+
+    first: whether the tile is the topmost; another one must begin with a pixel of the proxy, which
+    no two tiles can share.
+    """
+    found: dict[int, TileWriter] = {}
+    if not set(tile.models) <= {WHOLE.code, LINEAR.code, BOX.code}:
+        return found
+    last, y = tile, tile.region.y
+    for factor in FACTORS:
+        if y % factor and not first:
+            break
+        found[factor] = last = _halved(last, hemicube)
+    return found
+
+
+class _Grid:
+    """Which pixel of a proxy covers each pixel of a region, and how many it covers."""
+
+    def __init__(self, region: Region) -> None:
+        self.region = region
+        x0, y0 = region.x // 2, region.y // 2
+        x1, y1 = -(-(region.x + region.width) // 2), -(-(region.y + region.height) // 2)
+        self.half = Region(x0, y0, x1 - x0, y1 - y0)
+        rows = (region.y + np.arange(region.height)) // 2 - y0
+        columns = (region.x + np.arange(region.width)) // 2 - x0
+        self.of = (rows[:, None] * self.half.width + columns).ravel()
+        self.covers = np.bincount(self.of)
+
+    def blocks(self, image: NDArray) -> NDArray:
+        """(h, w, ...) -> (h', 2, w', 2, ...), with zeros where the region has no pixel."""
+        top, left = self.region.y % 2, self.region.x % 2
+        h, w = self.half.height, self.half.width
+        room = np.zeros((2 * h, 2 * w, *image.shape[2:]), image.dtype)
+        room[top : top + self.region.height, left : left + self.region.width] = image
+        return room.reshape(h, 2, w, 2, *image.shape[2:])
+
+    def mean(self, image: NDArray) -> NDArray:
+        """(h, w, ...) -> (h', w', ...)."""
+        total = self.blocks(image).sum(axis=(1, 3), dtype=np.float64)
+        covers = self.covers.reshape(self.half.height, self.half.width)
+        return total / covers.reshape(covers.shape + (1,) * (image.ndim - 2))
+
+    def total(self, pixels: NDArray, values: NDArray) -> NDArray[np.float64]:
+        """Sums of values (n,) at some pixels of the region -> (n',)."""
+        return np.bincount(self.of[pixels], values, self.half.pixels)
+
+
+def _halved(tile: TileWriter, hemicube: Hemicube) -> TileWriter:
+    grid = _Grid(tile.region)
+    shape = tile.region.height, tile.region.width
+    half = TileWriter(grid.half, {name: grid.mean(p) for name, p in tile.layers.items()})
+    of: dict[int, list[tuple[int, NDArray, NDArray, NDArray]]] = {}
+    for code, patches in tile.models.items():
+        for k, pixels, coefficient, parameters in patches:
+            of.setdefault(k, []).append((code, pixels, coefficient, parameters))
+    for k in range(tile.patches):
+        if k in of:
+            _merge(half, grid, of[k], hemicube, k)
+        half.patches += 1
+    half.rest = grid.mean(tile.rest.reshape(*shape, 3)).reshape(-1, 3)
+    half.rest_of = tile.rest_of
+    half.rest_bits = [
+        np.bitwise_or.reduce(grid.blocks(bits.reshape(shape)), axis=(1, 3)).ravel()
+        for bits in tile.rest_bits
+    ]
+    return half
+
+
+def _merge(
+    half: TileWriter,
+    grid: _Grid,
+    entries: list[tuple[int, NDArray, NDArray, NDArray]],
+    hemicube: Hemicube,
+    k: int,
+) -> None:
+    """Add a patch's entries to the proxy: (code, pixels, R, parameters) by model."""
+    extent = hemicube.extent(k)
+    whole = hemicube.uniform_moments(k)
+    light = np.zeros((grid.half.pixels, 3))
+    # sums of R, all channels, times the mean place; and of the boxes' alone, with the squares
+    places = np.zeros((2, grid.half.pixels))
+    boxes = np.zeros((5, grid.half.pixels))
+    for code, pixels, coefficient, parameters in entries:
+        size = coefficient.sum(axis=-1)
+        for c in range(3):
+            light[:, c] += grid.total(pixels, coefficient[:, c])
+        if code == BOX.code:
+            averages = box_averages(parameters / np.float64(65535), extent)
+            u, v = averages[U], averages[V]
+            for row, of in zip(boxes, (None, u, v, averages[UU], averages[VV]), strict=True):
+                row += grid.total(pixels, size if of is None else size * of)
+        elif code == LINEAR.code:
+            u, v = parameters.T / np.float64(255)
+        else:
+            u, v = whole[U], whole[V]
+        places[0] += grid.total(pixels, size * u)
+        places[1] += grid.total(pixels, size * v)
+    total = light.sum(axis=-1)
+    lit = np.flatnonzero(total > 0)
+    most = boxes[0, lit] > total[lit] / 2
+    light /= grid.covers[:, None]
+    plain, narrow = lit[~most], lit[most]
+    means = places[:, plain] / total[plain]
+    half.add_entries(LINEAR.code, plain, light[plain], means.T)
+    if len(narrow):
+        _, u, v, uu, vv = boxes[:, narrow] / boxes[0, narrow]
+        spread = np.maximum(uu - u * u, 0), np.maximum(vv - v * v, 0)
+        half.add_entries(BOX.code, narrow, light[narrow], box_of((u, v), spread, extent))

@@ -1,0 +1,150 @@
+"""One tile of a reflectance field in the making: entries patch after patch, written at the end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import FieldError
+from .field_tile import FULL, LARGEST, blocks_of, steps_of
+from .files import whole
+from .region import Region
+from .supports import BY_CODE, NOTHING
+
+
+class TileWriter:
+    """Collects one tile's entries, patch after patch, and writes them at the end."""
+
+    def __init__(self, region: Region, layers: dict[str, NDArray]) -> None:
+        self.region = region
+        self.layers = layers
+        self.patches = 0
+        # by model: pixels, R and parameters of each patch that has any, and the patch's number
+        self.models: dict[int, list[tuple[int, NDArray, NDArray, NDArray]]] = {}
+        # the largest R of an entry, by pixel and channel
+        self.peaks: NDArray[np.float32] = np.zeros((region.pixels, 3), np.float32)
+        # what was dropped: by pixel and channel, by patch, and a bit for each of both
+        self.rest: NDArray[np.float64] = np.zeros((region.pixels, 3))
+        self.rest_of: list[float] = []
+        self.rest_bits: list[NDArray[np.uint8]] = []
+
+    def add(self, codes: NDArray, coefficient: NDArray, parameters: dict[int, NDArray]) -> None:
+        """The next patch: model code (n,), R (n, 3), and each used code's parameters (m, p).
+
+        Light without an entry is added to the pixel's rest. A coefficient below 0, which only
+        patterns that do not fit together can give, is no light. Raises FieldError for one that is
+        no number.
+        """
+        low, high = coefficient.min(initial=0), coefficient.max(initial=0)
+        if not (low > -np.inf and high < np.inf):  # which NaN fails too
+            self._refuse(coefficient)
+        if low < 0:
+            coefficient = np.maximum(coefficient, 0)
+        lit = (coefficient[:, 0] > 0) | (coefficient[:, 1] > 0) | (coefficient[:, 2] > 0)
+        dropped = np.flatnonzero((codes == NOTHING) & lit)
+        self.add_rest(dropped, coefficient[dropped])
+        for code, values in parameters.items():
+            pixels = np.flatnonzero(codes == code)
+            self.add_entries(code, pixels, coefficient[pixels], values)
+        self.patches += 1
+
+    def add_rest(self, pixels: NDArray[np.intp], coefficient: NDArray) -> None:
+        """What is too small to be an entry, of the patch that is being added."""
+        self.rest[pixels] += coefficient
+        self.rest_of.append(float(coefficient.sum(dtype=np.float64)))
+        byte, bit = divmod(self.patches, 8)
+        if len(self.rest_bits) == byte:
+            self.rest_bits.append(np.zeros(self.region.pixels, np.uint8))
+        self.rest_bits[byte][pixels] |= np.uint8(1 << bit)
+
+    def add_entries(
+        self, code: int, pixels: NDArray[np.intp], coefficient: NDArray, parameters: NDArray
+    ) -> None:
+        """The entries of one model, of the patch that is being added."""
+        if not len(pixels):
+            return
+        coefficient = coefficient.astype(np.float32)
+        steps = steps_of(BY_CODE[code])
+        stored = np.clip(parameters, 0, 1) * np.iinfo(steps).max
+        kept = (self.patches, pixels.astype(np.uint32), coefficient, np.rint(stored).astype(steps))
+        self.models.setdefault(code, []).append(kept)
+        self.peaks[pixels] = np.maximum(self.peaks[pixels], coefficient)
+
+    def _refuse(self, coefficient: NDArray) -> NoReturn:
+        bad = np.flatnonzero(~np.isfinite(coefficient).all(axis=-1))
+        row, column = divmod(int(bad[0]), self.region.width)
+        raise FieldError(
+            f"patch {self.patches} has reflection coefficients that are infinite or not a "
+            f"number in {len(bad)} pixels, the first at ({self.region.x + column}, "
+            f"{self.region.y + row}): repair the basis images there, or capture again"
+        )
+
+    def write(self, folder: Path) -> dict[str, int]:
+        """Write the arrays; returns how many entries each model took."""
+        folder.mkdir(parents=True)
+        used = {}
+        blocks = blocks_of(self.region.pixels)
+        inverse = np.divide(1, self.peaks, out=np.zeros_like(self.peaks), where=self.peaks > 0)
+        # what the codes will add up to, and what they should: even light must give all of it
+        coded, meant = (np.zeros((self.region.pixels, 3), np.float32) for _ in range(2))
+        for code, patches in sorted(self.models.items()):
+            name = BY_CODE[code].name
+            counts = np.zeros((len(blocks), self.patches), np.uint32)
+            # by block and patch, which is the order in the file
+            parts: dict[tuple[int, int], tuple[NDArray, NDArray, NDArray]] = {}
+            for k, pixels, coefficient, parameters in patches:
+                shares = coefficient * inverse[pixels]
+                codes = np.rint(np.sqrt(shares) * FULL).astype(np.uint8)
+                meant[pixels] += shares
+                shares = codes.astype(np.float32) / FULL
+                coded[pixels] += shares * shares
+                bits = np.zeros(self.region.pixels, bool)
+                bits[pixels] = True
+                ends = np.searchsorted(pixels, [where.stop for where in blocks]).tolist()
+                for b, where in enumerate(blocks):
+                    rows = slice(ends[b - 1] if b else 0, ends[b])
+                    counts[b, k] = rows.stop - rows.start
+                    if counts[b, k]:
+                        packed = np.packbits(bits[where])
+                        parts[b, k] = codes[rows].T, parameters[rows].T, packed
+            each = [parts[key] for key in sorted(parts)]
+            np.save(folder / f"{name}_counts.npy", counts)
+            for what, arrays in zip(
+                ("coefficient", "parameters", "pixels"), zip(*each, strict=True), strict=True
+            ):
+                np.save(folder / f"{name}_{what}.npy", np.concatenate(arrays, axis=-1))
+            used[name] = int(counts.sum())
+        peaks = np.where(coded > 0, self.peaks * (meant / np.where(coded > 0, coded, 1)), 0)
+        units = _unit(peaks), _unit(self.rest)
+        np.save(folder / "peaks.npy", _halves(peaks, units[0]))
+        np.save(folder / "scales.npy", np.array(units, np.float32))
+        if self.rest.any():
+            np.save(folder / "rest.npy", _halves(self.rest, units[1]))
+            np.save(folder / "rest_patches.npy", np.stack(self.rest_bits))
+            # relative to the largest: only their ratios count, and none that is one may vanish
+            weights = np.array(self.rest_of) / max(self.rest_of)
+            weights = np.where(weights > 0, np.maximum(weights, 1e-30), 0)
+            np.save(folder / "rest_weights.npy", weights.astype(np.float32))
+        for name, pixels in self.layers.items():
+            write_layer(folder, name, pixels)
+        return used
+
+
+def _unit(values: NDArray) -> float:
+    """What half floats are a multiple of, so that any exposure fits them."""
+    return float(np.float32(values.max(initial=0) / LARGEST)) or 1.0
+
+
+def _halves(values: NDArray, unit: float) -> NDArray[np.float16]:
+    # the unit's own rounding must not take the largest past what a half float holds
+    return np.minimum(values / unit, 65504).astype(np.float16)
+
+
+def write_layer(folder: Path, name: str, pixels: NDArray) -> None:
+    """Write one of `field.LAYERS` of a tile into its folder, whole or not at all."""
+    dtype = np.float32 if name in ("own", "depth") else np.float16
+    with whole(folder / f"{name}.npy") as partial, partial.open("wb") as f:
+        np.save(f, pixels.astype(dtype))
