@@ -58,6 +58,7 @@ class CaptureSet:
             files = entry.get("files")
             if not isinstance(files, list) or not isinstance(entry.get("done"), bool):
                 raise said.wrong("tiles", entry)
+            _check_seeds(said, entry)
             self.regions.append(region)
             self.files.append([said.file_name(name, "files") for name in files])
             done.append(entry["done"])
@@ -104,12 +105,30 @@ class CaptureSet:
 
     def renders(self, tile: int) -> list[tuple[float, list[str]]]:
         """Of each seed that a tile was rendered with its share of the samples, and its files."""
-        return [(1.0, self.files[tile])]
+        seeds = self.head["tiles"][tile].get("seeds")
+        if not seeds:
+            return [(1.0, self.files[tile])]
+        total = sum(samples for samples, _ in seeds)
+        return [(samples / total, names) for samples, names in seeds]
 
     def read(self, tile: int) -> TileData:
         """All of a tile at once. Raises CaptureSetError."""
         with self.open(tile) as images:
             return images.read()
+
+
+def _check_seeds(said: Description, entry: dict[str, Any]) -> None:
+    """Of a tile that several seeds rendered: [[samples, files], ...], of the tile's files."""
+    seeds = entry.get("seeds", [])
+    if not isinstance(seeds, list):
+        raise said.wrong("seeds", seeds)
+    for seed in seeds:
+        if not (isinstance(seed, list) and len(seed) == 2 and isinstance(seed[1], list)):
+            raise said.wrong("seeds", seed)
+        if type(seed[0]) is not int or seed[0] < 1:
+            raise said.wrong("seeds", seed)
+        if any(name not in entry["files"] for name in seed[1]):
+            raise said.wrong("seeds", seed)
 
 
 def write_header(folder: Path, head: dict[str, Any]) -> None:

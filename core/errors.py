@@ -43,3 +43,7 @@ class BusyError(ArtoError):
 
 class CancelledError(ArtoError):
     """The artist stopped the work. Whatever was finished is kept."""
+
+
+class FarmError(ArtoError):
+    """A farm's job that is incomplete, damaged, or of another scene."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from . import choice as choices
 from .basis_images import BasisImages, TileData
 from .capture_set import CaptureSet
 from .evidence import evidence
-from .field_writer import FieldWriter
+from .field_writer import FieldWriter, write_tile
 from .hemicube import Hemicube
 from .moments import Moments
 from .patterns import PatternSet
@@ -90,6 +90,26 @@ def fit_tile(
         writer.add(codes, coefficient, parameters)
         yield READING + (1 - READING) * (k + 1) / patches
     yield writer
+
+
+def fit_into(
+    captured: CaptureSet, tile: int, folder: Path
+) -> Generator[float, None, dict[str, Any]]:
+    """Fit a tile of a capture set as its description asks, and write it into a field's folder:
+    yields the share that is done, returns the tile's entry in `field.json`.
+
+    Raises CaptureSetError, FieldError.
+    """
+    choice, separate = captured.head["choice"], captured.head["separate"]
+    with captured.open(tile) as data:
+        for step in fit_tile(
+            data, captured.patterns, captured.hemicube, choice, captured.samples, separate
+        ):
+            if isinstance(step, TileWriter):
+                folder.mkdir(exist_ok=True)
+                return write_tile(folder, tile, step, captured.hemicube)
+            yield step
+    raise AssertionError("a fit ends with its tile")
 
 
 def about_of(captured: CaptureSet, choice: str, separate: bool, **about: Any) -> dict[str, Any]:

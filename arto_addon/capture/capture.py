@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
@@ -14,47 +12,29 @@ import bpy
 
 from ...core import exr
 from ...core.basis_images import GRAIN, GROUP, group_name
-from ...core.capture_set import VERSION, describe, write_header
+from ...core.capture_set import write_header
 from ...core.choice import check as check_choice
-from ...core.errors import ArtoError, CaptureSetError, SceneError
+from ...core.errors import ArtoError, CaptureSetError
 from ...core.files import Lock, whole
 from ...core.hemicube import Hemicube
 from ...core.patterns import pattern_set
 from ...core.region import Region
-from ...core.shot import Shot
 from ..blender.output import write_to
 from ..relight.denoise import cleaned
-from ..shot import home, paths
-from ..shot.fingerprint import fingerprint, key_of
+from ..shot import paths
 from ..shot.shot import shot_of
-from ..stage.bounds import Rendered, rendered
-from ..stage.settings import prepare
-from ..stage.stage import Stage, picture_region, set_region, stage
+from ..stage.stage import Stage, set_region
 from ..work import Progress, Render, Steps
 from . import planes
+from .asked import asked, begun
 from .check import check_scene
 from .plan import SAMPLED, render_plan
-from .planned import Given, planned
+from .planned import Given
 from .resume import empty, finish, finish_field, let_go, unfinished
 from .stream import Stream
 
 
-def geometry(scene: bpy.types.Scene, seen: Rendered) -> Hemicube:
-    """The hemicube to capture with: the artist's, where one was built, else a new one."""
-    bounds = seen.bounds()
-    there = planes.built(scene)
-    if there is None:
-        return planes.wanted(scene, *bounds)
-    hemicube, radius = there
-    if planes.wanted(scene, hemicube.centre, radius).to_json() != hemicube.to_json():
-        raise SceneError(
-            "the hemicube in the scene was built with other settings: press Build Hemicube again, "
-            "or remove it"
-        )
-    return hemicube
-
-
-def _check_file(path: Path, images: list[tuple[int, str]]) -> None:
+def check_file(path: Path, images: list[tuple[int, str]]) -> None:
     """Raise CaptureSetError unless Blender wrote all of a render."""
     expected = {group_name(k, name) for k, name in images}
     found = set()
@@ -101,51 +81,15 @@ def _capture(
     only_estimate: bool,
     given: Given | None,
 ) -> Steps:
-    settings = scene.arto
-    region = picture_region(scene)
-    found = fingerprint(scene, view_layer, full=True)
-    with stage(scene, view_layer) as on:
-        seen = rendered(on)
-        seen.check()
-        hemicube = given.hemicube if given else geometry(scene, seen)
-        # between renders the paths differ, and grain would not be theirs
-        grain = settings.grain and settings.route == "all"
-        prepare(on, layers=len(pattern_set(settings.patterns)) + grain)
-        shot = shot_of(scene, view_layer, region)
-        asked, decides = _asked(scene, on, hemicube, shot, region, grain, found)
-        key = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:16]
-        folder = paths.unfinished_folder(claimed, key)
-        head = unfinished(folder, key)
+    with asked(scene, view_layer, given) as this:
+        folder = paths.unfinished_folder(claimed, this.key)
+        head = unfinished(folder, this.key)
         if head is None or only_estimate:
-            plan = yield from planned(scene, on, hemicube, region, grain, folder, given)
+            plan, head = yield from begun(this, folder, given)
             if only_estimate:
                 return plan.estimate
-            about = {
-                "scene": scene.name,
-                "file": home.file(),
-                "view_layer": view_layer,
-                "shot": shot.to_json(),
-                "frame": scene.frame_current,
-                "fingerprint": found,
-                "caution": plan.caution,
-            }
-            decides |= {
-                "route": plan.route,
-                "grain": plan.grain,
-                "kept": plan.kept,
-                "choice": settings.support,
-                "separate": settings.separate,
-            }
-            size = (shot.height, shot.width)
-            patterns = pattern_set(settings.patterns)
-            head = describe(plan.hemicube, patterns, size, key=key, **decides, **about)
-            head["seconds"] = 0.0
-            head["tiles"] = [
-                {"region": [t.x, t.y, t.width, t.height], "files": [], "done": False}
-                for t in plan.tiles
-            ]
             empty(folder)
-        yield from _render_tiles(on, folder, head)
+        yield from _render_tiles(this.on, folder, head)
     if not head["kept"]:
         finish_field(folder, claimed / "field", head)
         yield from cleaned(scene, claimed / "field")
@@ -156,49 +100,11 @@ def _capture(
     return claimed / "capture"
 
 
-def _asked(
-    scene: bpy.types.Scene,
-    on: Stage,
-    hemicube: Hemicube,
-    shot: Shot,
-    region: Region,
-    grain: bool,
-    found: dict[str, str],
-) -> tuple[list[Any], dict[str, Any]]:
-    """What tells a capture from another, and what of it goes into its description."""
-    settings = scene.arto
-    patterns = pattern_set(settings.patterns)
-    decides = {
-        "samples": settings.samples,
-        "seed": settings.seed,
-        "route": settings.route,
-        "grain": grain,
-        "adaptive": settings.adaptive,
-        "far": settings.far,
-        "blender": bpy.app.version_string,
-        "colour_space": bpy.data.colorspace.working_space,
-        "film_transparent": scene.render.film_transparent,
-        "changed": on.changed,
-    }
-    # names are not in it: a renamed file or scene goes on with what it has
-    frame = [shot.camera_matrix, shot.lens, shot.frame, shot.subframe, shot.view_layer]
-    asked = [describe(hemicube, patterns, (shot.height, shot.width), **decides), vars(region)]
-    asked += [frame, settings.memory, key_of(found), VERSION, settings.keep]
-    if settings.keep != "always":
-        asked += [settings.keep_limit, settings.support, settings.separate]
-    return asked, decides
-
-
 def _render_tiles(on: Stage, folder: Path, head: dict[str, Any]) -> Steps:
     """Render what is not there yet of a capture set, and fit it where it is not kept."""
-    hemicube = Hemicube.from_json(head["hemicube"])
-    patterns = pattern_set(head["patterns"])
-    names = [*patterns.patterns, *([GRAIN] if head["grain"] else [])]
-    plan = render_plan(head["route"], hemicube, names)
     tiles = [Region(*t["region"]) for t in head["tiles"]]
-    stream = None if head["kept"] else Stream(folder, head["choice"], head["separate"])
+    stream = None if head["kept"] else Stream(folder)
     write_header(folder, head)
-    total = len(plan) * len(tiles)
 
     def take(patience: float | None) -> bool:
         """Note down the tile that was fitted; whether one still is being fitted."""
@@ -214,29 +120,16 @@ def _render_tiles(on: Stage, folder: Path, head: dict[str, Any]) -> Steps:
             stream.start(number)
 
     try:
-        for t, tile in enumerate(tiles):
+        for t in range(len(tiles)):
             entry = head["tiles"][t]
             if entry["done"]:
                 yield Progress((t + 1) / len(tiles), f"tile {t + 1} of {len(tiles)} is there")
                 if stream and "fitted" not in entry:
                     yield from fit(t)
                 continue
-            set_region(on.scene, tile)
-            entry["files"] = []
-            for i, images in enumerate(plan):
-                at = t * len(plan) + i
-                text = f"render {at + 1} of {total}: {len(images)} basis images"
-                name = f"tile_{t:04d}.exr" if len(plan) == 1 else f"tile_{t:04d}_{i:04d}.exr"
-                # a process that was killed may have finished it without noting it down
-                if not _is_whole(folder / name, images):
-                    begun = time.perf_counter()
-                    work = Render(on.scene.name, at / total, text, 1 / total)
-                    around = planes.lit(
-                        on, hemicube, patterns, images, sampled=head["route"] == SAMPLED
-                    )
-                    yield from _render(on, around, images, folder / name, work)
-                    head["seconds"] += time.perf_counter() - begun
-                entry["files"].append(name)
+            begun_at = time.perf_counter()
+            entry["files"] = yield from render_tile(on, head, t, folder)
+            head["seconds"] += time.perf_counter() - begun_at
             entry["done"] = True
             write_header(folder, head)
             take(0.0)
@@ -248,12 +141,45 @@ def _render_tiles(on: Stage, folder: Path, head: dict[str, Any]) -> Steps:
             stream.stop()
 
 
-def _is_whole(path: Path, images: list[tuple[int, str]]) -> bool:
+def plan_of(head: dict[str, Any]) -> list[list[tuple[int, str]]]:
+    """The (patch, pattern name) images of each render of a tile, from a set's description."""
+    names = [*pattern_set(head["patterns"]).patterns, *([GRAIN] if head["grain"] else [])]
+    return render_plan(head["route"], Hemicube.from_json(head["hemicube"]), names)
+
+
+def set_tile(
+    on: Stage, head: dict[str, Any], number: int, images: list[tuple[int, str]]
+) -> AbstractContextManager[None]:
+    """The stage ready for a render of some images of a tile, from a set's description."""
+    set_region(on.scene, Region(*head["tiles"][number]["region"]))
+    hemicube, patterns = Hemicube.from_json(head["hemicube"]), pattern_set(head["patterns"])
+    return planes.lit(on, hemicube, patterns, images, sampled=head["route"] == SAMPLED)
+
+
+def render_tile(on: Stage, head: dict[str, Any], number: int, folder: Path) -> Steps:
+    """Render what is not there yet of a tile into a folder -> the names of its files."""
+    plan, tiles = plan_of(head), len(head["tiles"])
+    total = len(plan) * tiles
+    files = []
+    for i, images in enumerate(plan):
+        at = number * len(plan) + i
+        text = f"render {at + 1} of {total}: {len(images)} basis images"
+        name = f"tile_{number:04d}.exr" if len(plan) == 1 else f"tile_{number:04d}_{i:04d}.exr"
+        # a process that was killed may have finished it without noting it down
+        if not is_whole(folder / name, images):
+            work = Render(on.scene.name, at / total, text, 1 / total)
+            around = set_tile(on, head, number, images)
+            yield from _render(on, around, images, folder / name, work)
+        files.append(name)
+    return files
+
+
+def is_whole(path: Path, images: list[tuple[int, str]]) -> bool:
     """Whether the basis images of a render are there already."""
     if not path.is_file():
         return False
     try:
-        _check_file(path, images)
+        check_file(path, images)
     except ArtoError:
         return False  # rendered again
     return True
@@ -277,4 +203,4 @@ def _render(
                 f"Blender did not write {path}: make room on the disk, or choose a folder that "
                 "can be written"
             )
-        _check_file(partial, images)
+        check_file(partial, images)

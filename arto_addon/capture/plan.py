@@ -14,7 +14,7 @@ from .planes import MOST_SAMPLED
 SAMPLED = "sampled"
 
 
-# Rows of the picture that tiles begin at, where they are not too thin: those of all proxies.
+# Where tiles are not too thin they begin at a row of the picture that is one of all proxies.
 ALIGNED = 8
 
 
@@ -28,11 +28,18 @@ def tiles_of(region: Region, bytes_a_pixel: int, budget: int) -> list[Region]:
             "capture fewer patches or patterns"
         )
     count = -(-region.height // rows)
-    edges = [region.height * i // count for i in range(count + 1)]
     if count > 1 and rows >= 4 * ALIGNED:
-        # a pixel of a proxy must not be of two tiles
+        # their edges are moved by less than that
         count = -(-region.height // (rows - ALIGNED))
-        edges = [region.height * i // count for i in range(count + 1)]
+    return strips_of(region, count)
+
+
+def strips_of(region: Region, count: int) -> list[Region]:
+    """Cut a region into so many strips, or as many as it has rows; where they are not too thin, a
+    pixel of a proxy is never of two."""
+    count = min(count, region.height)
+    edges = [region.height * i // count for i in range(count + 1)]
+    if region.height >= 3 * ALIGNED * count:
         edges[1:-1] = [e + -(region.y + e) % ALIGNED for e in edges[1:-1]]
     return [
         Region(region.x, region.y + a, region.width, b - a) for a, b in itertools.pairwise(edges)

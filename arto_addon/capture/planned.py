@@ -19,7 +19,7 @@ from ..stage.stage import Stage
 from ..work import Progress, Steps
 from . import room
 from .light_check import check_light
-from .plan import SAMPLED, render_plan, tiles_of
+from .plan import SAMPLED, render_plan, strips_of, tiles_of
 from .probe import refined
 from .room import Estimate
 
@@ -58,9 +58,10 @@ def planned(
     grain: bool,
     folder: Path,
     given: Given | None,
+    strips: int | None = None,
 ) -> Steps:
-    """Look at the scene, by small renders -> `Planned`. Raises SceneError where there is no room
-    for it."""
+    """Look at the scene, by small renders -> `Planned`. strips: into how many tiles the picture is
+    cut (default: as the memory says). Raises SceneError where there is no room for it."""
     settings = scene.arto
     if given:
         route, caution = given.route, given.caution
@@ -77,7 +78,7 @@ def planned(
 
     def estimated(kept: bool) -> tuple[list[Region], Estimate]:
         bytes_a_pixel = room.bytes_a_pixel(max(plan), len(hemicube), not kept)
-        tiles = tiles_of(region, bytes_a_pixel, budget)
+        tiles = strips_of(region, strips) if strips else tiles_of(region, bytes_a_pixel, budget)
         seconds = None
         if on.pace:
             renders = len(plan) * len(tiles)

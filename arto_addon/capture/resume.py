@@ -52,6 +52,7 @@ def let_go(folder: Path, head: dict[str, Any], number: int, fitted: dict[str, An
     """Note down that a tile was fitted, then remove its basis images."""
     entry = head["tiles"][number]
     files, entry["files"] = entry["files"], []
+    entry.pop("seeds", None)
     entry["fitted"] = fitted
     write_header(folder, head)
     for name in files:

@@ -22,10 +22,10 @@ LEAST_MEGABYTES = 512
 ON_DISK = 12
 PER_PASS = 24
 PER_PATCH = 4
-FITTED = 700
+FITTED = 1600
 OTHER_PASSES = 8
-# Of a field on disk, with the layers that belong to it: of a pixel, and of each patch in it, about.
-FIELD, FIELD_PATCH = 42, 1.5
+# Of a field on disk, with its layers and proxies: of a pixel, and of each patch in it, about.
+FIELD, FIELD_PATCH = 62, 2.0
 # Of what is needed, how much more must be free.
 SPARE = 0.05
 

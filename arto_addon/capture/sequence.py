@@ -50,7 +50,7 @@ def capture_frames(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int
         raise SceneError("there are no frames to capture: give a first and a last one")
     folders: list[Path] = []
     with frame_kept(scene):
-        given = yield from _together(scene, view_layer, frames)
+        given = yield from together(scene, view_layer, frames)
         for i, frame in enumerate(frames):
             scene.frame_set(frame)
             steps = capture(scene, view_layer, given=given)
@@ -74,7 +74,7 @@ def _as_part(steps: Steps, part: int, parts: int, title: str) -> Steps:
         steps.close()
 
 
-def _together(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> Steps:
+def together(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> Steps:
     """The patches of all frames -> `Given`."""
     some = sorted({frames[0], frames[len(frames) // 2], frames[-1]})
     low, high = np.full(3, np.inf), np.full(3, -np.inf)

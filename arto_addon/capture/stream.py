@@ -13,9 +13,7 @@ from typing import Any
 
 from ...core.capture_set import CaptureSet
 from ...core.errors import CancelledError
-from ...core.field_writer import write_tile
-from ...core.fit import fit_tile
-from ...core.tile_writer import TileWriter
+from ...core.fit import fit_into
 
 
 class Stream:
@@ -23,8 +21,8 @@ class Stream:
 
     FIELD = "field"
 
-    def __init__(self, folder: Path, choice: str, separate: bool) -> None:
-        self.folder, self.choice, self.separate = folder, choice, separate
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
         self._entry: dict[str, Any] | None = None
@@ -46,23 +44,16 @@ class Stream:
         self._thread = threading.Thread(target=work, name=f"ARTO fits tile {number}")
         self._thread.start()
 
-    def _fit(self, captured: CaptureSet, number: int) -> dict[str, Any] | None:
-        with captured.open(number) as data:
-            for step in fit_tile(
-                data,
-                captured.patterns,
-                captured.hemicube,
-                self.choice,
-                captured.samples,
-                self.separate,
-            ):
-                if self._stop.is_set():
-                    raise CancelledError("cancelled")
-                if isinstance(step, TileWriter):
-                    (self.folder / self.FIELD).mkdir(exist_ok=True)
-                    return write_tile(self.folder / self.FIELD, number, step, captured.hemicube)
-                self.share = step
-        raise AssertionError("a fit ends with its tile")
+    def _fit(self, captured: CaptureSet, number: int) -> dict[str, Any]:
+        steps = fit_into(captured, number, self.folder / self.FIELD)
+        while True:
+            try:
+                self.share = next(steps)
+            except StopIteration as end:
+                return end.value
+            if self._stop.is_set():
+                steps.close()
+                raise CancelledError("cancelled")
 
     def ended(self, patience: float | None) -> tuple[int, dict[str, Any]] | None:
         """The tile that was fitted, and its entry in `field.json`; None where none is, or not

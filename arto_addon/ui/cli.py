@@ -1,4 +1,4 @@
-"""`blender scene.blend --command arto capture|fit|relight`: the same work, with options."""
+"""`blender scene.blend --command arto VERB`: the same work, with options; and a farm's parts."""
 
 from __future__ import annotations
 
@@ -14,12 +14,15 @@ import bpy
 from ...core.errors import ArtoError, CancelledError
 from ..capture.capture import capture
 from ..capture.sequence import capture_frames
+from ..farm.gather import gather
+from ..farm.part import render_part, save_part
+from ..farm.plan import plan
 from ..fit import fit
 from ..job import run as job
 from ..relight.many import relight_many
 from ..relight.relight import relight
 from ..shot import paths
-from ..work import ProgressLines, run
+from ..work import Progress, ProgressLines, Render, run
 from . import properties
 
 _commands: list[Any] = []
@@ -31,7 +34,7 @@ def _parser() -> argparse.ArgumentParser:
         description="Capture how the scene answers light, fit it, and relight it with its world.",
         epilog="Exit codes: 0 done, 1 failed, 2 wrong options, 130 cancelled.",
     )
-    jobs = parser.add_subparsers(dest="job", required=True)
+    jobs = parser.add_subparsers(dest="verb", required=True)
     files = argparse.ArgumentParser(add_help=False)
     files.add_argument("--scene", help="name of the scene (default: the .blend's)")
     files.add_argument("--view-layer", help="name of the view layer (default: the scene's)")
@@ -41,17 +44,22 @@ def _parser() -> argparse.ArgumentParser:
         ("fit", "fit the reflectance field", properties.FIT),
         ("relight", "relight with the scene's world", properties.RELIGHT),
         ("adopt", "use what was captured for another file or scene", ()),
+        (
+            "plan",
+            "plan a capture by many machines",
+            (*properties.HEMICUBE, *properties.CAPTURE, *properties.FIT),
+        ),
     ):
         one = jobs.add_parser(name, parents=[files], help=text)
         for setting in settings:
             _add_option(one, setting)
-        if name in ("capture", "relight"):
+        if name in ("capture", "relight", "plan"):
             one.add_argument(
                 "--frames",
                 type=_frames,
                 default=None,
-                help="first and last frame, and a step: 1-24, 1-100:5 (capture: a field for each; "
-                "relight: a picture for each)",
+                help="first and last frame, and a step: 1-24, 1-100:5 (a field for each, "
+                "or a picture)",
             )
         if name == "capture":
             one.add_argument(
@@ -66,6 +74,25 @@ def _parser() -> argparse.ArgumentParser:
             one.add_argument(
                 "--turntable", type=int, default=1, help="so many pictures, turned once around"
             )
+        if name == "plan":
+            one.add_argument("--job", type=Path, required=True, help="the folder to plan into")
+            one.add_argument("--tiles", type=int, help="tiles a frame (default: by the memory)")
+            one.add_argument(
+                "--seeds", type=int, default=1, help="renders of each, whose light is averaged"
+            )
+    for name, text in (("part", "render a part of a job"), ("gather", "join a job's parts")):
+        one = jobs.add_parser(name, help=text)
+        if name == "part":
+            one.add_argument("number", type=int, help="of the part, from 0")
+            one.add_argument(
+                "--save-blend",
+                action="store_true",
+                help="save it for a Blender without ARTO to render, and render nothing",
+            )
+        one.add_argument("--job", type=Path, required=True, help="the folder of the job")
+        one.add_argument(
+            "--openjd", action="store_true", help="say the progress as Open Job Description has it"
+        )
     # what the window starts
     jobs.add_parser("job").add_argument("task", type=Path)
     return parser
@@ -102,9 +129,11 @@ def main(arguments: list[str]) -> int:
         options = vars(_parser().parse_args(arguments))
     except SystemExit as e:
         return int(e.code or 0)
-    verb = options.pop("job")
+    verb = options.pop("verb")
     if verb == "job":
         return job.main(options["task"])
+    if verb in ("part", "gather"):
+        return _of_a_farm(verb, options)
     name, layer = options.pop("scene"), options.pop("view_layer")
     scene = bpy.data.scenes.get(name) if name else bpy.context.scene
     if scene is None:
@@ -125,6 +154,7 @@ def main(arguments: list[str]) -> int:
         options["faces"] = set(options["faces"])
         options["preset"] = "custom"
     frames, estimate = options.pop("frames", None), options.pop("estimate", False)
+    planned = {name: options.pop(name, None) for name in ("job", "tiles", "seeds")}
     worlds, turns = options.pop("worlds", None), options.pop("turntable", 1)
     for key, value in options.items():
         if value is not None:
@@ -146,7 +176,14 @@ def main(arguments: list[str]) -> int:
             work = capture(scene, layer, only_estimate=True)
             print(json.dumps(run(work, ProgressLines(verb)).to_json()), flush=True)
             return 0
-        if verb == "capture" and frames:
+        if verb == "plan":
+            some = frames or [scene.frame_current]
+            tiles, seeds = planned["tiles"], planned["seeds"]
+            if (tiles is not None and tiles < 1) or seeds < 1:
+                print("ARTO: --tiles and --seeds are at least 1", file=sys.stderr)
+                return 2
+            work = plan(scene, layer, planned["job"].resolve(), some, tiles, seeds)
+        elif verb == "capture" and frames:
             work = capture_frames(scene, layer, frames)
         elif verb == "relight" and (worlds or frames or turns > 1):
             files = [w.resolve() for w in worlds or ()]
@@ -154,13 +191,41 @@ def main(arguments: list[str]) -> int:
         else:
             work = {"capture": capture, "fit": fit, "relight": relight}[verb](scene, layer)
         run(work, ProgressLines(verb))
-    except CancelledError as e:
-        print(f"ARTO: {e}", file=sys.stderr)
-        return 130
     except ArtoError as e:
-        print(f"ARTO: {e}", file=sys.stderr)
-        return 1
+        return _failed(e)
     return 0
+
+
+def _failed(error: ArtoError) -> int:
+    """Say why; the exit code."""
+    print(f"ARTO: {error}", file=sys.stderr)
+    return 130 if isinstance(error, CancelledError) else 1
+
+
+def _of_a_farm(verb: str, options: dict[str, Any]) -> int:
+    """A part of a job, or what joins them: its settings are the job's; the exit code."""
+    folder = options["job"].resolve()
+    try:
+        if verb == "gather":
+            work = gather(folder)
+        else:
+            work = (save_part if options["save_blend"] else render_part)(folder, options["number"])
+        made = run(work, OpenJDLines() if options["openjd"] else ProgressLines(verb))
+    except ArtoError as e:
+        if options["openjd"]:
+            print(f"openjd_fail: {e}", flush=True)
+        return _failed(e)
+    for path in made if isinstance(made, list) else [made]:
+        # what render managers look for
+        print(f"Saved: '{path}'", flush=True)
+    return 0
+
+
+class OpenJDLines:
+    """Progress in the lines that an Open Job Description session reads."""
+
+    def __call__(self, step: Progress | Render) -> None:
+        print(f"openjd_progress: {100 * step.share:.1f}\nopenjd_status: {step.text}", flush=True)
 
 
 def register() -> None:

@@ -12,6 +12,7 @@ import pytest
 from arto.arto_addon import fit, work
 from arto.arto_addon.capture import capture, planned
 from arto.arto_addon.shot import paths, status
+from arto.arto_addon.stage.stage import picture_region
 from arto.core import exr
 from arto.core.basis_images import GROUP
 from arto.core.errors import ArtoError, CancelledError, CaptureSetError, SceneError
@@ -88,7 +89,7 @@ def test_tiles_make_the_same_picture(tmp_path):
     scene = small_scene(tmp_path)
     whole = captured(scene).read(0)
     # 38 passes of 24 bytes and 24 pixels a row: 16 MB hold it all, so ask for strips directly
-    region = capture.picture_region(scene)
+    region = picture_region(scene)
     strips = planned.tiles_of(region, 38 * 24, 16 << 20)
     assert strips == [region]
     budget = planned.tiles_of
@@ -109,7 +110,10 @@ def test_tiles_make_the_same_picture(tmp_path):
 
 
 def test_tiles_fit_the_budget(scene):
-    region = type(capture.picture_region(scene))
+    region = type(picture_region(scene))
+    tiles = planned.tiles_of(region(5, 3, 2000, 1000), 488 * 24, 1 << 30)
+    assert all(t.y % 8 == 0 for t in tiles[1:]), "a proxy's pixel is of one tile"
+    assert max(t.height for t in tiles) * 2000 * 488 * 24 <= 1 << 30
     tiles = planned.tiles_of(region(5, 3, 2000, 1000), 488 * 24, 256 << 20)
     assert tiles[0].y == 3 and sum(t.height for t in tiles) == 1000
     assert all(a.y + a.height == b.y for a, b in itertools.pairwise(tiles))

@@ -1,0 +1,143 @@
+"""A part of a farm's job: one tile of one frame under one seed, rendered and, where it is the only
+seed and no images are kept, fitted."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...core.capture_set import CaptureSet
+from ...core.errors import FarmError
+from ...core.files import PART, replace_folder, write_text
+from ...core.fit import fit_into
+from ...core.shot import Shot
+from ..blender.output import write_to
+from ..capture.asked import Asked, asked
+from ..capture.capture import plan_of, render_tile, set_tile
+from ..capture.check import check_scene
+from ..capture.planned import Given
+from ..capture.stream import Stream
+from ..work import Progress, Steps
+from .job import PART_HEADER, Job, Part
+
+
+def render_part(job_folder: Path, number: int) -> Steps:
+    """Render a part of a job, unless it is there; returns its folder.
+
+    It is there whole or not at all: killed, it is rendered again. Raises FarmError where the scene
+    is not what was planned, and what `capture` raises.
+    """
+    job = Job(job_folder)
+    part = job.part(number)
+    captured = job.set_of(part.frame)
+    folder = job.part_folder(part)
+    if job.there(part, captured.head["key"]):
+        yield Progress(1.0, f"{part.name} is there")
+        return folder
+    begun = time.perf_counter()
+    # by its process: a farm may have given the part to two machines
+    partial = folder.with_name(f"{part.name}.{os.getpid()}{PART}")
+    try:
+        partial.mkdir(parents=True)
+        with _on_stage(job, part, captured) as this:
+            files = yield from render_tile(this.on, captured.head, part.tile, partial)
+        told: dict[str, Any] = {"part": vars(part), "key": captured.head["key"]}
+        told["samples"] = captured.head["samples"]
+        if job.seeds == 1 and not captured.kept:
+            told["fitted"] = yield from _fitted(captured, part, partial, files)
+            for name in files:
+                (partial / name).unlink()
+            files = []
+        told |= {"files": files, "seconds": round(time.perf_counter() - begun, 3)}
+        write_text(partial / PART_HEADER, json.dumps(told, indent=1))
+        replace_folder(partial, folder)
+    except OSError as e:
+        raise FarmError(f"{folder} cannot be written ({e}): make room, or see who may write") from e
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+    yield Progress(1.0, f"rendered {part.name}")
+    return folder
+
+
+def save_part(job_folder: Path, number: int) -> Steps:
+    """Save a part as .blend files that a Blender without ARTO renders, one for each of its renders;
+    returns the first. What they render to, `gather` finds. Raises as `render_part`."""
+    job = Job(job_folder)
+    part = job.part(number)
+    captured = job.set_of(part.frame)
+    saved = []
+    with _on_stage(job, part, captured) as this:
+        for i, images in enumerate(plan_of(captured.head)):
+            yield Progress(i / len(plan_of(captured.head)), f"saving {part.name}")
+            path = job.folder / "parts" / f"{part.name}_{i:02d}.blend"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with set_tile(this.on, captured.head, part.tile, images):
+                write_to(this.on.scene.render, Path(f"//{part.name}_{i:02d}_####.exr"))
+                _save_alone(this.on.scene, path)
+            saved.append(path)
+    yield Progress(1.0, f"saved {len(saved)} files of {part.name}")
+    return saved[0]
+
+
+def _save_alone(scene: bpy.types.Scene, path: Path) -> None:
+    """Save a file of this scene alone, and of what it needs, at its frame."""
+    scene.frame_start = scene.frame_end = scene.frame_current
+    bpy.data.libraries.write(str(path), {scene}, path_remap="RELATIVE", compress=True)
+
+
+@contextmanager
+def _on_stage(job: Job, part: Part, captured: CaptureSet) -> Iterator[Asked]:
+    """The stage of a part, with its seed. Raises FarmError unless the scene is what was planned."""
+    head = captured.head
+    with job.scene() as (scene, view_layer):
+        scene.frame_set(part.frame)
+        check_scene(scene, view_layer)
+        scene.view_layers[view_layer].update()
+        with asked(scene, view_layer, Given(captured.hemicube, head["route"], None)) as this:
+            changed = _differences(this, head)
+            if changed:
+                raise FarmError(
+                    f"this is not the scene that was planned ({'; '.join(changed[:3])}): give "
+                    "every machine the same file and the same Blender, or plan again"
+                )
+            this.on.scene.cycles.seed += part.seed
+            yield this
+
+
+def _differences(this: Asked, head: dict[str, Any]) -> list[str]:
+    """What of a scene is not as it was planned, in words."""
+    out = []
+    for name in ("samples", "seed", "adaptive", "far", "blender", "colour_space"):
+        if this.decides[name] != head.get(name):
+            out.append(f"{name.replace('_', ' ')}: {this.decides[name]}, not {head.get(name)}")
+    planned = head["fingerprint"]
+    for thing in sorted(planned.keys() | this.found.keys()):
+        if planned.get(thing) != this.found.get(thing):
+            out.append(f"{thing} is another")
+    there = Shot.from_json(head["shot"])
+    for name in ("camera_matrix", "lens", "frame", "subframe", "width", "height"):
+        if getattr(this.shot, name) != getattr(there, name):
+            out.append(f"the shot's {name.replace('_', ' ')} is another")
+    return out
+
+
+def _fitted(captured: CaptureSet, part: Part, folder: Path, files: list[str]) -> Steps:
+    """Fit a part's tile into its folder -> its entry in `field.json`."""
+    rendered = CaptureSet(captured.folder, unfinished=True)
+    rendered.folder = folder
+    rendered.files[part.tile] = files
+    steps = fit_into(rendered, part.tile, folder / Stream.FIELD)
+    while True:
+        try:
+            share = next(steps)
+        except StopIteration as end:
+            return end.value
+        yield Progress(0.5 + share / 2, f"fitting {part.name}")
