@@ -108,7 +108,14 @@ def _on_stage(job: Job, part: Part, captured: CaptureSet) -> Iterator[Asked]:
                     f"this is not the scene that was planned ({'; '.join(changed[:3])}): give "
                     "every machine the same file and the same Blender, or plan again"
                 )
-            this.on.scene.cycles.seed += part.seed
+            if job.seeds > 1:
+                # a stretch of the one sequence that as many samples together have, which is better
+                # than as many seeds: its samples lie between those of the other stretches
+                cycles = this.on.scene.cycles
+                cycles.use_sample_subset = True
+                cycles.sample_subset_length = head["samples"]
+                cycles.sample_offset = part.seed * head["samples"]
+                cycles.samples = job.seeds * head["samples"]
             yield this
 
 

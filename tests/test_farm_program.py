@@ -1,0 +1,87 @@
+"""A farm's job in the real program, run by the command line of Open Job Description."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from program_tools import Program, said
+
+pytestmark = pytest.mark.skipif(
+    not os.environ.get("BLENDER"),
+    reason="BLENDER is not set: it is the command line of the Blender executable to test in",
+)
+# One machine, with the tiles that the job has.
+ALONE = """
+import bpy
+from bl_ext.user_default.arto.arto_addon.capture import planned
+
+planned.tiles_of = lambda region, *_: planned.strips_of(region, 4)
+bpy.ops.arto.capture()
+"""
+# As a farm starts Blender: no preferences, no network, and the one add-on.
+QUIET = ("-b", "--factory-startup", "--offline-mode", "--addons", "bl_ext.user_default.arto")
+
+
+def arrays(folder: Path) -> dict[str, np.ndarray]:
+    (field,) = folder.rglob("field/field.json")
+    return {str(p.relative_to(field.parent)): np.load(p) for p in field.parent.rglob("*.npy")}
+
+
+def test_an_openjd_job_is_what_one_machine_makes(
+    program: Program, made: Path, tmp_path: Path
+) -> None:
+    """Four parts, one of them killed and run again: the field, bit for bit."""
+    one, farm = tmp_path / "one", tmp_path / "farm"
+    for folder in (one, farm):
+        folder.mkdir()
+        shutil.copy(made / "scene.blend", folder)
+    done = program.run("-b", one / "scene.blend", "--python-expr", ALONE)
+    assert list(one.rglob("field.json")), said(done)
+    blend, job = farm / "scene.blend", farm / "job"
+    line = ("plan", "--job", job, "--tiles", "4")
+    done = program.run(*QUIET, blend, "--command", "arto", *line)
+    assert done.returncode == 0, said(done)
+    assert json.loads((job / "job.json").read_text())["parts"] == 4
+
+    # what a farm runs, killed while it renders
+    part = [*program.command, *QUIET, blend, "--command", "arto", "part", "2", "--job", job]
+    killed = subprocess.Popen(
+        [str(word) for word in part], env=program.environment, start_new_session=True,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    until = time.monotonic() + 60
+    while not list(job.glob("parts/part_0002.*.part")) and time.monotonic() < until:
+        time.sleep(0.05)
+    os.killpg(killed.pid, signal.SIGKILL)
+    killed.wait()
+    assert not (job / "parts" / "part_0002").exists()
+    done = program.run(*QUIET, blend, "--command", "arto", "gather", "--job", job)
+    assert done.returncode == 1 and "4 of 4 parts are not there (0, 1, 2, 3)" in said(done)
+
+    blender = tmp_path / "blender"
+    blender.write_text(f'#!/bin/sh\nexec {shlex.join(program.command)} "$@"\n')
+    blender.chmod(0o755)
+    openjd = [Path(sys.executable).with_name("openjd"), "run", job / "openjd.json", "--verbose"]
+    for name, value in {"Blender": blender, "Blend": blend, "Job": job}.items():
+        openjd += ["--job-param", f"{name}={value}"]
+    ran = subprocess.run(
+        [*map(str, openjd), "--step", "Gather", "--run-dependencies"],
+        env=program.environment, capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert ran.returncode == 0, ran.stdout[-3000:] + ran.stderr[-2000:]
+    assert "openjd_progress: 100.0" in ran.stdout and "Saved: '" in ran.stdout
+    expected, found = arrays(one), arrays(farm)
+    assert expected.keys() == found.keys()
+    for name, array in expected.items():
+        np.testing.assert_array_equal(array, found[name], err_msg=name)
+    assert not list((job / "parts").iterdir())
