@@ -167,6 +167,15 @@ def _field(options: argparse.Namespace) -> None:
     print(table(rows))
 
 
+def _speed(options: argparse.Namespace) -> None:
+    from .speed import speed, table
+
+    text = table(speed(options.json, options.quick, options.samples))
+    if options.page:
+        options.page.write_text(text + "\n", encoding="utf-8")
+    print(text)
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
@@ -257,6 +266,13 @@ def main() -> int:
     c.add_argument("--only", nargs="+", help="cases that begin so")
     c.add_argument("--page", type=Path, help="of the docs, to write")
     c.set_defaults(run=_field)
+
+    c = commands.add_parser("speed", help="every stage beside what it cannot be faster than")
+    c.add_argument("--json", type=Path, default=Path("out/speed.json"))
+    c.add_argument("--quick", action="store_true", help="a few minutes: the smallest sizes")
+    c.add_argument("--samples", type=int, default=64)
+    c.add_argument("--page", type=Path, help="a table in Markdown, to write")
+    c.set_defaults(run=_speed)
 
     c = commands.add_parser("patterns", help="what each set of patterns can identify")
     c.set_defaults(run=_patterns)

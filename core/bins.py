@@ -40,20 +40,19 @@ def sample_bins(
     width: int,
     resolutions: NDArray,
     offsets: NDArray,
-    turn: float = 0.0,
 ) -> Iterator[Samples]:
-    """The bins of every sample of a map of that size, turned by `turn`, block by block.
+    """The bins of every sample of a map of that size, block by block.
 
     The same for every map of a size, so those of the last one are kept unless it is large: turning
     through HDRIs is common.
     """
-    key = (hemicube, height, width, resolutions.tobytes(), turn)
+    key = (hemicube, height, width, resolutions.tobytes())
     if key in _KEPT:
         yield from _KEPT[key]
         return
     # two samples a bin and axis on average; a narrow bin may still stay empty
     finer = max(1, int(np.ceil(8 * (resolutions * hemicube.sides).max() / width)))
-    azimuth, latitude, weight = sample_directions(height, width, finer, turn)
+    azimuth, latitude, weight = sample_directions(height, width, finer)
 
     def fill(bins: NDArray, row: int) -> None:
         # float64: float32 moves a sample on a patch's border to the other side

@@ -250,9 +250,11 @@ def _check_chunks(
         raise LayoutError("chunks of it are missing")
 
     def number_at(places: NDArray) -> NDArray[np.int64]:
-        # copies of four bytes: a view of a mapped file would keep it open
-        found = b"".join(data[at : at + 4] for at in places.tolist())
-        return np.frombuffer(found, "<u4").astype(np.int64)
+        # a copy of what is there: a view of a mapped file would keep it open
+        view = np.frombuffer(data, np.uint8)
+        found = sum(view.take(places + i).astype(np.int64) << 8 * i for i in range(4))
+        del view
+        return np.asarray(found, np.int64)
 
     if number is not None and (number_at(offsets) != number).any():
         raise LayoutError("its chunks are mixed up")

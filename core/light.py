@@ -40,10 +40,8 @@ class PatchLight:
         height, width = environment.image.shape[:2]
         # flux and solid angle side by side: one look-up fetches all four
         self._flat = np.zeros((int(self._offsets[-1]), 4))
-        for some in sample_bins(
-            hemicube, height, width, self.resolutions, self._offsets, environment.turn
-        ):
-            self._collect(environment.image[some.rows], some)
+        for some in sample_bins(hemicube, height, width, self.resolutions, self._offsets):
+            self._collect(environment.image[some.rows], some, environment.turn)
         self._fill_empty(environment)
         self._lock = Lock()
         self._polynomials: dict[tuple[int, ...], NDArray[np.float64]] = {}
@@ -53,15 +51,15 @@ class PatchLight:
             np.cumsum(self.bins_of(k), axis=0, out=table[1:, 1:])
             np.cumsum(table[1:, 1:], axis=1, out=table[1:, 1:])
 
-    def _collect(self, texels: NDArray, some: Samples) -> None:
-        """Add some rows of the map to the bins."""
+    def _collect(self, texels: NDArray, some: Samples, turn: float) -> None:
+        """Add some rows of the map, turned, to the bins."""
         lit = some.bins.ravel() >= 0
         index = some.bins.ravel()[lit]
         solid_angle = np.repeat(some.weight, some.bins.shape[1])[lit]
         np.add.at(self._flat[:, 3], index, solid_angle)
         for c in range(3):
             samples = np.repeat(texels[..., c], some.finer, axis=0)
-            samples = np.repeat(samples, some.finer, axis=1).ravel()[lit]
+            samples = _turned(np.repeat(samples, some.finer, axis=1), turn).ravel()[lit]
             np.add.at(self._flat[:, c], index, samples * solid_angle)
 
     @property
@@ -172,6 +170,19 @@ class PatchLight:
         high *= fj
         low += high
         return low
+
+
+def _turned(samples: NDArray, turn: float) -> NDArray:
+    """What cells of a map (rows, columns) see of it once it is turned: its mean over each. So the
+    cells stay where they are, and their bins need not be looked for again."""
+    shift = turn / (2 * np.pi) * samples.shape[1]
+    whole = int(np.floor(shift))
+    part = shift - whole
+    if part < 1e-6 or part > 1 - 1e-6:
+        return np.roll(samples, round(shift), axis=1) if round(shift) else samples
+    out = (1 - part) * np.roll(samples, whole, axis=1)
+    out += part * np.roll(samples, whole + 1, axis=1)
+    return out
 
 
 def _starts(sizes: NDArray) -> NDArray[np.intp]:

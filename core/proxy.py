@@ -100,33 +100,33 @@ def _merge(
     """Add a patch's entries to the proxy: (code, pixels, R, parameters) by model."""
     extent = hemicube.extent(k)
     whole = hemicube.uniform_moments(k)
-    light = np.zeros((grid.half.pixels, 3))
+    light = np.zeros((3, grid.half.pixels))
     # sums of R, all channels, times the mean place; and of the boxes' alone, with the squares
     places = np.zeros((2, grid.half.pixels))
-    boxes = np.zeros((5, grid.half.pixels))
+    boxes = np.zeros((5, grid.half.pixels if BOX.code in [code for code, *_ in entries] else 0))
     for code, pixels, coefficient, parameters in entries:
-        size = coefficient.sum(axis=-1)
-        for c in range(3):
-            light[:, c] += grid.total(pixels, coefficient[:, c])
+        size = coefficient[0] + coefficient[1] + coefficient[2]
+        for row, channel in zip(light, coefficient, strict=True):
+            row += grid.total(pixels, channel)
         if code == BOX.code:
-            averages = box_averages(parameters / np.float64(65535), extent)
+            averages = box_averages(parameters.T / np.float64(65535), extent)
             u, v = averages[U], averages[V]
             for row, of in zip(boxes, (None, u, v, averages[UU], averages[VV]), strict=True):
                 row += grid.total(pixels, size if of is None else size * of)
         elif code == LINEAR.code:
-            u, v = parameters.T / np.float64(255)
+            u, v = parameters / np.float32(255)
         else:
             u, v = whole[U], whole[V]
         places[0] += grid.total(pixels, size * u)
         places[1] += grid.total(pixels, size * v)
-    total = light.sum(axis=-1)
+    total = light[0] + light[1] + light[2]
     lit = np.flatnonzero(total > 0)
-    most = boxes[0, lit] > total[lit] / 2
-    light /= grid.covers[:, None]
+    most = boxes[0, lit] > total[lit] / 2 if boxes.size else np.zeros(len(lit), bool)
+    light /= grid.covers
     plain, narrow = lit[~most], lit[most]
     means = places[:, plain] / total[plain]
-    half.add_entries(LINEAR.code, plain, light[plain], means.T)
+    half.add_entries(LINEAR.code, plain, light[:, plain], means)
     if len(narrow):
         _, u, v, uu, vv = boxes[:, narrow] / boxes[0, narrow]
         spread = np.maximum(uu - u * u, 0), np.maximum(vv - v * v, 0)
-        half.add_entries(BOX.code, narrow, light[narrow], box_of((u, v), spread, extent))
+        half.add_entries(BOX.code, narrow, light[:, narrow], box_of((u, v), spread, extent).T)

@@ -22,10 +22,10 @@ class TileWriter:
         self.region = region
         self.layers = layers
         self.patches = 0
-        # by model: pixels, R and parameters of each patch that has any, and the patch's number
+        # by model: of each patch that has any its number, pixels, R (3, m) and parameters (p, m)
         self.models: dict[int, list[tuple[int, NDArray, NDArray, NDArray]]] = {}
-        # the largest R of an entry, by pixel and channel
-        self.peaks: NDArray[np.float32] = np.zeros((region.pixels, 3), np.float32)
+        # the largest R of an entry, by channel and pixel
+        self.peaks: NDArray[np.float32] = np.zeros((3, region.pixels), np.float32)
         # what was dropped: by pixel and channel, by patch, and a bit for each of both
         self.rest: NDArray[np.float64] = np.zeros((region.pixels, 3))
         self.rest_of: list[float] = []
@@ -48,7 +48,9 @@ class TileWriter:
         self.add_rest(dropped, coefficient[dropped])
         for code, values in parameters.items():
             pixels = np.flatnonzero(codes == code)
-            self.add_entries(code, pixels, coefficient[pixels], values)
+            # a channel a row: numpy is slow at rows of three
+            light = np.stack([coefficient[:, c].take(pixels) for c in range(3)])
+            self.add_entries(code, pixels, light, values.T)
         self.patches += 1
 
     def add_rest(self, pixels: NDArray[np.intp], coefficient: NDArray) -> None:
@@ -63,15 +65,19 @@ class TileWriter:
     def add_entries(
         self, code: int, pixels: NDArray[np.intp], coefficient: NDArray, parameters: NDArray
     ) -> None:
-        """The entries of one model, of the patch that is being added."""
+        """The entries of one model, of the patch that is being added.
+
+        coefficient: R (3, m); parameters: (p, m).
+        """
         if not len(pixels):
             return
-        coefficient = coefficient.astype(np.float32)
+        coefficient = coefficient.astype(np.float32, copy=False)
         steps = steps_of(BY_CODE[code])
         stored = np.clip(parameters, 0, 1) * np.iinfo(steps).max
         kept = (self.patches, pixels.astype(np.uint32), coefficient, np.rint(stored).astype(steps))
         self.models.setdefault(code, []).append(kept)
-        self.peaks[pixels] = np.maximum(self.peaks[pixels], coefficient)
+        for peak, light in zip(self.peaks, coefficient, strict=True):
+            peak[pixels] = np.maximum(peak.take(pixels), light)
 
     def _refuse(self, coefficient: NDArray) -> NoReturn:
         bad = np.flatnonzero(~np.isfinite(coefficient).all(axis=-1))
@@ -89,18 +95,21 @@ class TileWriter:
         blocks = blocks_of(self.region.pixels)
         inverse = np.divide(1, self.peaks, out=np.zeros_like(self.peaks), where=self.peaks > 0)
         # what the codes will add up to, and what they should: even light must give all of it
-        coded, meant = (np.zeros((self.region.pixels, 3), np.float32) for _ in range(2))
+        coded, meant = (np.zeros(self.peaks.shape, np.float32) for _ in range(2))
         for code, patches in sorted(self.models.items()):
             name = BY_CODE[code].name
             counts = np.zeros((len(blocks), self.patches), np.uint32)
             # by block and patch, which is the order in the file
             parts: dict[tuple[int, int], tuple[NDArray, NDArray, NDArray]] = {}
             for k, pixels, coefficient, parameters in patches:
-                shares = coefficient * inverse[pixels]
-                codes = np.rint(np.sqrt(shares) * FULL).astype(np.uint8)
-                meant[pixels] += shares
-                shares = codes.astype(np.float32) / FULL
-                coded[pixels] += shares * shares
+                codes = np.empty(coefficient.shape, np.uint8)
+                for c, light in enumerate(coefficient):
+                    shares = inverse[c].take(pixels)
+                    shares *= light
+                    np.add.at(meant[c], pixels, shares)
+                    codes[c] = shares = np.rint(np.sqrt(shares) * FULL)
+                    shares *= shares
+                    np.add.at(coded[c], pixels, shares)
                 bits = np.zeros(self.region.pixels, bool)
                 bits[pixels] = True
                 ends = np.searchsorted(pixels, [where.stop for where in blocks]).tolist()
@@ -109,7 +118,7 @@ class TileWriter:
                     counts[b, k] = rows.stop - rows.start
                     if counts[b, k]:
                         packed = np.packbits(bits[where])
-                        parts[b, k] = codes[rows].T, parameters[rows].T, packed
+                        parts[b, k] = codes[:, rows], parameters[:, rows], packed
             each = [parts[key] for key in sorted(parts)]
             np.save(folder / f"{name}_counts.npy", counts)
             for what, arrays in zip(
@@ -117,9 +126,10 @@ class TileWriter:
             ):
                 np.save(folder / f"{name}_{what}.npy", np.concatenate(arrays, axis=-1))
             used[name] = int(counts.sum())
-        peaks = np.where(coded > 0, self.peaks * (meant / np.where(coded > 0, coded, 1)), 0)
+        peaks = self.peaks * np.divide(meant, coded, out=np.zeros_like(coded), where=coded > 0)
+        peaks *= np.float32(FULL**2)
         units = _unit(peaks), _unit(self.rest)
-        np.save(folder / "peaks.npy", _halves(peaks, units[0]))
+        np.save(folder / "peaks.npy", _halves(peaks.T, units[0]))
         np.save(folder / "scales.npy", np.array(units, np.float32))
         if self.rest.any():
             np.save(folder / "rest.npy", _halves(self.rest, units[1]))

@@ -371,6 +371,28 @@ def test_a_map_of_another_size_or_cube_is_not_mistaken(noisy, monkeypatch) -> No
                 np.testing.assert_array_equal(binned, PatchLight(e, cube, r).binned)
 
 
+@pytest.mark.parametrize("texels", [1, 5.5, -3, 17.25])
+def test_a_turned_map_is_the_map_with_its_columns_moved(noisy, texels: float) -> None:
+    """To the digit where columns move as a whole; else what the light is that the map shows."""
+    cube, width = Hemicube(patches=3), 128
+    turn = texels / width * 2 * np.pi
+    if texels % 1 == 0:
+        image = noisy(4, 64).image
+        found = PatchLight(Environment(image, turn), cube)
+        expected = PatchLight(Environment(np.roll(image, int(texels), axis=1)), cube)
+        np.testing.assert_allclose(found.binned, expected.binned, rtol=1e-6)
+        return
+
+    def light(columns: np.ndarray) -> np.ndarray:
+        row = 2 + np.cos(columns / width * 2 * np.pi) + np.sin(columns / width * 6 * np.pi)
+        return np.tile(row[:, None].astype(np.float32), (64, 1, 3))
+
+    columns = np.arange(width) + 0.5
+    found = PatchLight(Environment(light(columns), turn), cube)
+    expected = PatchLight(Environment(light(columns - texels)), cube)
+    np.testing.assert_allclose(found.whole, expected.whole, rtol=2e-3)
+
+
 def test_the_bins_of_a_large_map_are_worked_out_in_blocks(noisy, monkeypatch) -> None:
     """They are not kept, and no array of all its samples is made: the light is the same to the
     order of a sum, which is that of the rows in both."""
@@ -382,7 +404,9 @@ def test_the_bins_of_a_large_map_are_worked_out_in_blocks(noisy, monkeypatch) ->
     sizes = []
     real = PatchLight._collect
     monkeypatch.setattr(
-        PatchLight, "_collect", lambda s, t, some: sizes.append(some.bins.size) or real(s, t, some)
+        PatchLight,
+        "_collect",
+        lambda s, t, some, turn: sizes.append(some.bins.size) or real(s, t, some, turn),
     )
     monkeypatch.setattr(bins, "BLOCK", 3000)
     monkeypatch.setattr(bins, "KEPT", 0)
