@@ -176,6 +176,14 @@ def _speed(options: argparse.Namespace) -> None:
     print(text)
 
 
+def _flicker(options: argparse.Namespace) -> None:
+    from .flicker import flicker, table
+
+    sizes = options.width, options.frames, options.samples
+    print(table(flicker(options.json, options.sheet, options.worlds, *sizes)))
+    print(f"look at {options.sheet}")
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
@@ -273,6 +281,15 @@ def main() -> int:
     c.add_argument("--samples", type=int, default=64)
     c.add_argument("--page", type=Path, help="a table in Markdown, to write")
     c.set_defaults(run=_speed)
+
+    c = commands.add_parser("flicker", help="a moving shot relit, beside Cycles' own frames")
+    c.add_argument("--json", type=Path, default=Path("out/flicker.json"))
+    c.add_argument("--sheet", type=Path, default=Path("out/flicker.png"))
+    c.add_argument("--worlds", nargs="+", default=["forest", "courtyard"])
+    c.add_argument("--width", type=int, default=120)
+    c.add_argument("--frames", type=int, default=24)
+    c.add_argument("--samples", type=int, default=64)
+    c.set_defaults(run=_flicker)
 
     c = commands.add_parser("patterns", help="what each set of patterns can identify")
     c.set_defaults(run=_patterns)

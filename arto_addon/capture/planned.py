@@ -11,13 +11,14 @@ import bpy
 
 from ...core.basis_images import GRAIN
 from ...core.choice import check as check_choice
+from ...core.errors import ArtoError
 from ...core.hemicube import Hemicube
 from ...core.patterns import pattern_set
 from ...core.refine import check as can_refine
 from ...core.region import Region
-from ..stage.stage import Stage
+from ..stage.stage import Stage, picture_region
 from ..work import Progress, Steps
-from . import room
+from . import planes, room
 from .light_check import check_light
 from .plan import SAMPLED, render_plan, strips_of, tiles_of
 from .probe import refined
@@ -105,3 +106,27 @@ def light_route(on: Stage, hemicube: Hemicube) -> Steps:
         return settings.route, None
     sampled, caution = yield from check_light(on, hemicube)
     return (SAMPLED if sampled else settings.route), caution
+
+
+def guess(scene: bpy.types.Scene, short: bool = False) -> str:
+    """What a capture may take at most, in words, before anything is looked at: for the button.
+
+    short: of memory and disk alone, for a panel. What it will take, the capture says after its
+    probe. Where it cannot be, why not: a panel raises nothing.
+    """
+    settings = scene.arto
+    try:
+        hemicube = planes.wanted(scene, (0.0, 0.0, 0.0), 1.0)
+        patches = len(hemicube) * (ADAPTIVE_SHARE if settings.adaptive else 1)
+        names = len(pattern_set(settings.patterns)) + settings.grain
+        fitted = settings.keep == "never"
+        budget = room.budget(settings.memory)
+        tiles = tiles_of(
+            picture_region(scene), room.bytes_a_pixel(patches * names, patches, fitted), budget
+        )
+        found = room.estimate([patches * names], tiles, patches, fitted)
+        if short:
+            return f"up to {room.size(found.memory)} memory, {room.size(found.disk)} disk"
+        return f"up to {found.line}"
+    except ArtoError as e:
+        return str(e)

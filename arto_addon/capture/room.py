@@ -58,8 +58,10 @@ def budget(megabytes: int) -> int:
 def bytes_a_pixel(passes: int, patches: int, fitted: bool) -> int:
     """Memory that a pixel of a tile takes while the tile is rendered and, where captures are fitted
     as they come, the last one is fitted."""
-    fit = patches * PER_PATCH + FITTED if fitted else 0
-    return (passes + OTHER_PASSES) * PER_PASS + fit
+    every = passes + OTHER_PASSES
+    # the last one's file is mapped while it is read
+    fit = every * ON_DISK + patches * PER_PATCH + FITTED if fitted else 0
+    return every * PER_PASS + fit
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,9 @@ import numpy as np
 
 from ...core.errors import ArtoError, CancelledError, SceneError
 from ..capture.capture import capture
+from ..capture.sequence import capture_frames
 from ..fit import fit
+from ..relight.many import frames_of, relight_many
 from ..relight.relight import compute
 from ..shot import home
 from ..work import STOPPED, Progress, Render, run
@@ -46,7 +48,7 @@ def main(path: Path) -> int:
     try:
         with writer.samples():
             result = run(_steps(Task.read(path), folder), writer)
-        made = result[0] if isinstance(result, tuple) else result
+        made = result[0] if isinstance(result, tuple | list) else result
         state = State(1.0, writer.text, end="done", result=str(made))
     except CancelledError as e:
         state, code = State(writer.share, str(e), end="cancelled"), 130
@@ -79,6 +81,10 @@ def _steps(task: Task, folder: Path) -> Any:
             raise SceneError(f"the painted image '{painted.name}' is not in the copy of the file")
         image.pixels.foreach_set(np.load(folder / painted.pixels))
         image.update()
+    if task.verb == "capture_frames":
+        return capture_frames(scene, task.view_layer, frames_of(scene))
+    if task.verb == "relight_frames":
+        return relight_many(scene, task.view_layer, frames=frames_of(scene))
     work = {"capture": capture, "fit": fit, "relight": compute}[task.verb]
     return work(scene, task.view_layer)
 

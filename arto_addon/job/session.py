@@ -29,7 +29,13 @@ from .task import State, clock
 
 # How often the window looks how far the job is.
 EVERY = 0.2
-DOING = {"capture": "capturing", "fit": "fitting", "relight": "relighting"}
+DOING = {
+    "capture": "capturing",
+    "fit": "fitting",
+    "relight": "relighting",
+    "capture_frames": "capturing the frames of",
+    "relight_frames": "relighting the frames of",
+}
 LOG = "log.txt"
 
 
@@ -57,7 +63,7 @@ class Job:
         self.blend = bpy.data.filepath
         self.light = scene.arto.look.strip()
         _remove_leftovers(claimed)
-        if verb != "relight" and (holder := Lock.holder(claimed)):
+        if not verb.startswith("relight") and (holder := Lock.holder(claimed)):
             raise BusyError(
                 f"{claimed} is in use: {holder}; wait until it is done, or end it there"
             )

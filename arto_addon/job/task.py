@@ -16,7 +16,7 @@ from ...core.files import write_text
 
 TASK = "task.json"
 PROGRESS = "progress.json"
-VERBS = ("capture", "fit", "relight")
+VERBS = ("capture", "fit", "relight", "capture_frames", "relight_frames")
 
 
 @dataclass(frozen=True)

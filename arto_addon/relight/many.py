@@ -18,6 +18,7 @@ from ..shot import paths
 from ..shot.shot import check_same_shot, shot_of
 from ..work import Progress, Steps
 from ..world.check import check_world
+from . import plate
 from .relight import Light, Shown, show
 
 
@@ -72,6 +73,19 @@ def relight_many(
                     done.append(path)
     yield Progress(1.0, f"wrote {len(done)} pictures, the last one {done[-1]}")
     return done
+
+
+def relight_frames(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> Steps:
+    """Relight the frames of a shot, or of an animated world over a still, and show them as a
+    sequence in the compositor; returns their paths. Raises as `relight_many`."""
+    done = yield from relight_many(scene, view_layer, frames=frames)
+    plate.present_frames(scene, done[0], frames)
+    return done
+
+
+def frames_of(scene: bpy.types.Scene) -> range:
+    """The frames that the scene renders."""
+    return range(scene.frame_start, scene.frame_end + 1, scene.frame_step)
 
 
 def _named(base: Path, file: Path | None, number: int | None) -> Path:

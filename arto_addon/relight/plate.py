@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,28 @@ def present(scene: bpy.types.Scene, path: Path, look: str | None = None) -> bpy.
         print(f"ARTO: the compositor '{tree}' is linked and stays as it is: add '{name}' to it")
     if not bpy.app.background and bpy.context.window_manager.windows:
         bpy.ops.ed.undo_push(message="Relight")
+    return image
+
+
+def present_frames(
+    scene: bpy.types.Scene, first: Path, frames: Sequence[int], look: str | None = None
+) -> bpy.types.Image:
+    """Show plates of frames, numbered as `many` numbers them, as a sequence: an image and its node,
+    which at each frame of the scene show that frame's.
+
+    first: the first frame's file. They stand beside the plate of a single frame.
+    """
+    name = f"{name_of(scene, look)} Frames"
+    image = show(first, name)
+    image.source = "SEQUENCE"
+    group = node_group(image, name)
+    if source := group.nodes.get(SOURCE):
+        source.frame_duration = frames[-1] - frames[0] + 1
+        source.frame_start = frames[0]
+        # a sequence counts its files from 1
+        source.frame_offset = frames[0] - 1
+        source.use_auto_refresh = True
+    wire(scene, group)
     return image
 
 

@@ -19,7 +19,7 @@ from ..farm.part import render_part, save_part
 from ..farm.plan import plan
 from ..fit import fit
 from ..job import run as job
-from ..relight.many import relight_many
+from ..relight.many import relight_frames, relight_many
 from ..relight.relight import relight
 from ..shot import paths
 from ..work import Progress, ProgressLines, Render, run
@@ -185,6 +185,8 @@ def main(arguments: list[str]) -> int:
             work = plan(scene, layer, planned["job"].resolve(), some, tiles, seeds)
         elif verb == "capture" and frames:
             work = capture_frames(scene, layer, frames)
+        elif verb == "relight" and frames and not worlds and turns == 1:
+            work = relight_frames(scene, layer, frames)
         elif verb == "relight" and (worlds or frames or turns > 1):
             files = [w.resolve() for w in worlds or ()]
             work = relight_many(scene, layer, files, turns, frames or ())

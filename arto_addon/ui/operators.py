@@ -13,8 +13,11 @@ from ...core.files import Lock
 from ..capture import planes
 from ..capture.capture import capture
 from ..capture.check import check_scene
+from ..capture.planned import guess
+from ..capture.sequence import capture_frames
 from ..fit import fit
 from ..job import session
+from ..relight.many import frames_of, relight_frames
 from ..relight.relight import relight
 from ..shot import paths
 from ..shot.shot import layer_of
@@ -93,6 +96,16 @@ class ARTO_OT_remove_hemicube(_Quick):
         return "removed the hemicube"
 
 
+def _can_capture(cls: type, context: bpy.types.Context) -> bool:
+    if context.scene.render.engine != "CYCLES":
+        cls.poll_message_set("ARTO captures with Cycles: choose it as the render engine")
+        return False
+    if context.scene.camera is None:
+        cls.poll_message_set("The scene has no camera")
+        return False
+    return _free(cls)
+
+
 class ARTO_OT_capture(LongWork):
     """Render how the scene answers light from every patch, with Cycles"""
 
@@ -102,13 +115,12 @@ class ARTO_OT_capture(LongWork):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if context.scene.render.engine != "CYCLES":
-            cls.poll_message_set("ARTO captures with Cycles: choose it as the render engine")
-            return False
-        if context.scene.camera is None:
-            cls.poll_message_set("The scene has no camera")
-            return False
-        return _free(cls)
+        return _can_capture(cls, context)
+
+    @classmethod
+    def description(cls, context: bpy.types.Context, properties: object) -> str:
+        text = "Render how the scene answers light from every patch, with Cycles"
+        return f"{text}. It takes {guess(context.scene)}"
 
     def check(self, scene: bpy.types.Scene) -> None:
         check_scene(scene)
@@ -154,6 +166,47 @@ class ARTO_OT_relight(LongWork):
 
     def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
         return relight(scene, view_layer)
+
+
+class ARTO_OT_capture_frames(LongWork):
+    """Capture every frame that the scene renders, a field for each, by the same patches"""
+
+    bl_idname = "arto.capture_frames"
+    bl_label = "Capture Frames"
+    verb = "capture_frames"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _can_capture(cls, context)
+
+    def check(self, scene: bpy.types.Scene) -> None:
+        check_scene(scene)
+
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
+        return capture_frames(scene, view_layer, frames_of(scene))
+
+
+class ARTO_OT_relight_frames(LongWork):
+    """Relight every frame that the scene renders, as a sequence in the compositor: of a shot \
+whose frames were captured, or of an animated world over a still"""
+
+    bl_idname = "arto.relight_frames"
+    bl_label = "Relight Frames"
+    verb = "relight_frames"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if world_of(context.scene) is None:
+            cls.poll_message_set("The scene has no world to relight with: add one with an HDRI")
+            return False
+        return _free(cls)
+
+    def check(self, scene: bpy.types.Scene) -> None:
+        check_world(scene)
+        paths.relit_file(scene)
+
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
+        return relight_frames(scene, view_layer, frames_of(scene))
 
 
 def _there(cls: type, context: bpy.types.Context, folder: str, name: str, say: str) -> bool:
@@ -239,6 +292,8 @@ CLASSES = (
     ARTO_OT_capture,
     ARTO_OT_fit,
     ARTO_OT_relight,
+    ARTO_OT_capture_frames,
+    ARTO_OT_relight_frames,
     ARTO_OT_cancel,
     ARTO_OT_adopt,
     ARTO_OT_discard_unfinished,

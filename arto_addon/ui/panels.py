@@ -6,6 +6,7 @@ import bpy
 
 from ...core.hemicube import SIDES
 from ..capture import planes
+from ..capture.planned import guess
 from ..job import session
 from ..shot import paths, status
 from ..shot.status import Line
@@ -54,6 +55,8 @@ class ARTO_PT_main(_Panel, bpy.types.Panel):
         column.separator()
         column.prop(settings, "samples")
         column.operator("arto.capture", icon="RENDER_STILL")
+        if not session.current:
+            column.label(text=guess(context.scene, short=True), icon="DISK_DRIVE")
         _line(column, status.capture_line(context.scene))
         _line(column, status.caution_line(context.scene))
         if stopped := status.unfinished_line(context.scene):
@@ -109,6 +112,21 @@ class ARTO_PT_hemicube(_Panel, bpy.types.Panel):
                 sub.prop(settings, name)
 
 
+class ARTO_PT_frames(_Panel, bpy.types.Panel):
+    bl_label = "Frames"
+    bl_parent_id = "ARTO_PT_main"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column, scene = self.column(), context.scene
+        row = column.row(align=True)
+        row.prop(scene, "frame_start", text="Frames")
+        row.prop(scene, "frame_end", text="")
+        row.prop(scene, "frame_step", text="")
+        column.operator("arto.capture_frames", icon="RENDER_ANIMATION")
+        column.operator("arto.relight_frames", icon="WORLD")
+
+
 class ARTO_PT_capture(_Panel, bpy.types.Panel):
     bl_label = "Capture and Files"
     bl_parent_id = "ARTO_PT_main"
@@ -123,4 +141,4 @@ class ARTO_PT_capture(_Panel, bpy.types.Panel):
             column.label(text=place, icon="FILE_FOLDER")
 
 
-CLASSES = (ARTO_PT_main, ARTO_PT_hemicube, ARTO_PT_capture)
+CLASSES = (ARTO_PT_main, ARTO_PT_frames, ARTO_PT_hemicube, ARTO_PT_capture)

@@ -10,19 +10,24 @@ import bpy
 from ..job import session
 from ..job.session import Job
 from ..relight import plate
+from ..relight.many import frames_of
 
 _keys: list[tuple[Any, Any]] = []
 
 
 def show_relit(job: Job) -> str:
-    """A relight has ended: put the plate into the file, if it is still open, and show it."""
+    """A relight has ended: put the plate, or its frames, into the file, if that is still open, and
+    show it."""
     path = Path(job.state.result)
     scene = next((s for s in bpy.data.scenes if s.arto.scene_id == job.scene_id), None)
     if scene is None or bpy.data.filepath != job.blend:
         return f"wrote {path} (its scene is not open any more)"
     window = bpy.context.window_manager.windows[0]
     with bpy.context.temp_override(window=window):
-        reveal(plate.present(scene, path, job.light))
+        if job.verb == "relight_frames":
+            reveal(plate.present_frames(scene, path, frames_of(scene), job.light))
+        else:
+            reveal(plate.present(scene, path, job.light))
     return job.state.text
 
 
@@ -52,7 +57,7 @@ def _editor() -> bpy.types.Area | None:
 
 
 def register() -> None:
-    session.finishers["relight"] = show_relit
+    session.finishers["relight"] = session.finishers["relight_frames"] = show_relit
     keys = bpy.context.window_manager.keyconfigs.addon
     if keys:  # none without a window
         # the last one to be asked: whatever else takes an ESC has it first
@@ -62,6 +67,7 @@ def register() -> None:
 
 def unregister() -> None:
     session.finishers.pop("relight", None)
+    session.finishers.pop("relight_frames", None)
     while _keys:
         keymap, item = _keys.pop()
         keymap.keymap_items.remove(item)

@@ -191,6 +191,46 @@ def test_an_animated_world_over_a_still(scene):
     np.testing.assert_allclose(np.array(light) / light[0], [1, 2, 3], rtol=1e-3)
 
 
+def test_frames_are_a_sequence_in_the_compositor(scene):
+    """The image is a sequence, and its node shows at each frame of the scene that frame's file."""
+    captured(scene)
+    work.run(fit.fit(scene))
+    hdri(scene, smooth())
+    strength = scene.world.node_tree.nodes["Background"].inputs["Strength"]
+    for frame, value in ((5, 1.0), (7, 3.0)):
+        strength.default_value = value
+        strength.keyframe_insert("default_value", frame=frame)
+    action = scene.world.node_tree.animation_data.action
+    for curve in action.layers[0].strips[0].channelbags[0].fcurves:
+        for key in curve.keyframe_points:
+            key.interpolation = "LINEAR"
+    scene.frame_start, scene.frame_end = 5, 7
+    scene.frame_set(5)
+    scene.render.film_transparent = True
+    assert bpy.ops.arto.relight_frames() == {"FINISHED"}
+    image = bpy.data.images["ARTO Relit Frames"]
+    assert image.source == "SEQUENCE" and image.filepath.endswith("relit_0005.exr")
+    node = bpy.data.node_groups["ARTO Relit Frames"].nodes["ARTO Relit"]
+    assert (node.frame_start, node.frame_duration, node.frame_offset) == (5, 3, 4)
+    # what the compositor shows
+    tree = scene.compositing_node_group
+    group = next(n for n in tree.nodes if n.label == "ARTO Relit Frames")
+    out = next(n for n in tree.nodes if n.bl_idname == "NodeGroupOutput")
+    tree.links.new(group.outputs["Image"], out.inputs[0])
+    from arto.arto_addon.blender.output import float_exr
+
+    shown = []
+    folder = paths.relit_file(scene).parent
+    float_exr(scene.render, multilayer=False)
+    scene.cycles.samples, scene.render.use_compositing = 1, True
+    for frame in (5, 6, 7):
+        scene.frame_set(frame)
+        scene.render.filepath = str(folder / f"shown{frame}.exr")
+        bpy.ops.render.render(write_still=True)
+        shown.append(picture(folder / f"shown{frame}.exr")[..., :3].mean())
+    np.testing.assert_allclose(np.array(shown) / shown[0], [1, 2, 3], rtol=1e-2)
+
+
 def test_an_animated_shot(scene):
     """A field for each frame, of the same patches; a frame without one is refused in words."""
     thing = scene.objects["Matt"]

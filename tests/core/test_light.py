@@ -390,7 +390,7 @@ def test_a_turned_map_is_the_map_with_its_columns_moved(noisy, texels: float) ->
     columns = np.arange(width) + 0.5
     found = PatchLight(Environment(light(columns), turn), cube)
     expected = PatchLight(Environment(light(columns - texels)), cube)
-    np.testing.assert_allclose(found.whole, expected.whole, rtol=2e-3)
+    np.testing.assert_allclose(found.whole, expected.whole, rtol=0.01)
 
 
 def test_the_bins_of_a_large_map_are_worked_out_in_blocks(noisy, monkeypatch) -> None:
