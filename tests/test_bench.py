@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from bench.seconds import (
@@ -79,3 +81,36 @@ def test_rows_get_their_seconds_and_their_break_even() -> None:
     price(rows, {"a": TIMES}, 128)
     assert rows[-1]["break_even"] == 4 and "break_even" not in rows[0]
     assert {r["plain_render_seconds"] for r in rows} == {TIMES.render_of(128)}
+
+
+def test_slopes_are_exponents() -> None:
+    """Of pixels and patches; the gain of a second thread in powers of two."""
+    from bench.speed import slopes
+
+    at = {"where": "module", "patches": 192}
+    rows = [
+        {"stage": "fit", "width": w, "height": w, "seconds": 3e-6 * (w * w) ** 1.25} | at
+        for w in (64, 128, 512)
+    ]
+    few = {"stage": "fit", "width": 64, "height": 64, "where": "module", "patches": 48}
+    rows.append(few | {"seconds": rows[0]["seconds"] / 4})
+    for threads, seconds in ((1, 3.0), (2, 1.5)):
+        said = {"stage": "relight sum", "threads": threads, "seconds": seconds}
+        rows.append(said | {"width": 64, "height": 64, "where": "module"})
+    found = {(r["stage"], r["grows_with"]): r["slope"] for r in slopes(rows)}
+    assert found["fit", "pixels"] == pytest.approx(1.25)
+    assert found["fit", "patches"] == pytest.approx(1.0)
+    assert found["relight sum", "threads"] == pytest.approx(1.0)
+
+
+def test_a_stage_is_timed_in_a_process_of_its_own(tmp_path: Path) -> None:
+    from bench.speed import _run, table
+    from bench.speed_stages import Size
+
+    rows = _run("synthetic", Size(48, 27, 16, patches=24), tmp_path)
+    stages = {r["stage"] for r in rows}
+    assert {"synthetic fit", "field write", "relight sum"} <= stages
+    assert all(r["peak_bytes"] > 1 << 26 and r["seconds"] > 0 for r in rows)
+    assert "| synthetic fit, 24 patches | 48x27 | module |" in table(rows)
+    with pytest.raises(RuntimeError, match="the stage nothing"):
+        _run("nothing", Size(48, 27, 16), tmp_path)

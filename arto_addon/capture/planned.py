@@ -94,6 +94,7 @@ def planned(
         check_choice(settings.support, pattern_set(settings.patterns), settings.separate)
         tiles, estimate = estimated(kept)
     yield Progress(0.0, f"this capture: {estimate.line}")
+    room.check_memory(estimate.memory, "this capture")
     room.check_disk(folder, estimate.disk, "this capture")
     return Planned(hemicube, route, grain, kept, caution, tiles, estimate)
 
@@ -108,25 +109,29 @@ def light_route(on: Stage, hemicube: Hemicube) -> Steps:
     return (SAMPLED if sampled else settings.route), caution
 
 
-def guess(scene: bpy.types.Scene, short: bool = False) -> str:
-    """What a capture may take at most, in words, before anything is looked at: for the button.
-
-    short: of memory and disk alone, for a panel. What it will take, the capture says after its
-    probe. Where it cannot be, why not: a panel raises nothing.
-    """
+def most(scene: bpy.types.Scene) -> Estimate:
+    """What a capture may take at most, before anything is looked at. Raises SceneError,
+    HemicubeError, PatternError."""
     settings = scene.arto
+    hemicube = planes.wanted(scene, (0.0, 0.0, 0.0), 1.0)
+    patches = len(hemicube) * (ADAPTIVE_SHARE if settings.adaptive else 1)
+    images = patches * (len(pattern_set(settings.patterns)) + settings.grain)
+    fitted = settings.keep == "never"
+    bytes_a_pixel = room.bytes_a_pixel(images, patches, fitted)
+    tiles = tiles_of(picture_region(scene), bytes_a_pixel, room.budget(settings.memory))
+    return room.estimate([images], tiles, patches, fitted)
+
+
+def guess(scene: bpy.types.Scene, short: bool = False) -> str:
+    """`most` in words, for the button; short: of memory and disk alone, for a panel.
+
+    What it will take, the capture says after its probe. Where it cannot be, why not: a panel raises
+    nothing.
+    """
     try:
-        hemicube = planes.wanted(scene, (0.0, 0.0, 0.0), 1.0)
-        patches = len(hemicube) * (ADAPTIVE_SHARE if settings.adaptive else 1)
-        names = len(pattern_set(settings.patterns)) + settings.grain
-        fitted = settings.keep == "never"
-        budget = room.budget(settings.memory)
-        tiles = tiles_of(
-            picture_region(scene), room.bytes_a_pixel(patches * names, patches, fitted), budget
-        )
-        found = room.estimate([patches * names], tiles, patches, fitted)
-        if short:
-            return f"up to {room.size(found.memory)} memory, {room.size(found.disk)} disk"
-        return f"up to {found.line}"
+        found = most(scene)
     except ArtoError as e:
         return str(e)
+    if short:
+        return f"up to {room.size(found.memory)} memory, {room.size(found.disk)} disk"
+    return f"up to {found.line}"

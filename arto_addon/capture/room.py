@@ -16,6 +16,8 @@ from ..job.task import clock
 # Of the machine's memory, what the chain may take where the artist does not say: Blender, the scene
 # and the rest of the machine have the others.
 SHARE = 1 / 6
+# and at most this of what is free: the scene itself takes some of it, twice.
+FREE_SHARE = 1 / 2
 LEAST_MEGABYTES = 512
 # Bytes of a pixel: of a layer on disk; of each light group in Cycles' and in Blender's buffers; of
 # a patch while it is fitted; of what was fitted; of the layers that are no groups.
@@ -30,8 +32,8 @@ FIELD, FIELD_PATCH = 62, 2.0
 SPARE = 0.05
 
 
-def machine_memory() -> int:
-    """Bytes of memory that the machine has."""
+def memory() -> tuple[int, int | None]:
+    """Bytes of memory that the machine has, and that are free; None where it does not say."""
     if sys.platform == "win32":
         import ctypes
 
@@ -44,15 +46,23 @@ def machine_memory() -> int:
         status = Status()
         status.length = ctypes.sizeof(Status)
         ctypes.windll.kernel32.GlobalMemoryStatusEx(ctypes.byref(status))
-        return int(status.total)
-    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+        return int(status.total), int(status.free)
+    total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    try:
+        # what Linux could give without swapping; other systems have no such file
+        said = Path("/proc/meminfo").read_text(encoding="ascii")
+        return total, int(said.split("MemAvailable:")[1].split()[0]) << 10
+    except (OSError, IndexError, ValueError):
+        return total, None
 
 
 def budget(megabytes: int) -> int:
     """Bytes that capture and fit may take; megabytes: what the artist says, 0 for a share."""
     if megabytes:
         return megabytes << 20
-    return max(LEAST_MEGABYTES << 20, int(machine_memory() * SHARE))
+    total, free = memory()
+    share = int(total * SHARE) if free is None else int(min(total * SHARE, free * FREE_SHARE))
+    return max(LEAST_MEGABYTES << 20, share)
 
 
 def bytes_a_pixel(passes: int, patches: int, fitted: bool) -> int:
@@ -127,4 +137,14 @@ def check_disk(folder: Path, needed: int, what: str) -> None:
         raise SceneError(
             f"{what} needs {size(needed)} of disk, and {folder} has {size(free)} free: make room, "
             "choose another folder in ARTO's settings, or let Keep Basis Images be Never"
+        )
+
+
+def check_memory(needed: int, what: str) -> None:
+    """Raise SceneError where the machine has not that much memory free."""
+    _, free = memory()
+    if free is not None and free < needed:
+        raise SceneError(
+            f"{what} needs {size(needed)} of memory, and {size(free)} are free: close other "
+            "programs, or lower Memory in ARTO's settings (more tiles, each smaller)"
         )

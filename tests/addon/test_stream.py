@@ -169,8 +169,39 @@ def test_a_full_disk_is_seen_before_the_first_render(tmp_path, monkeypatch):
     assert not rendered
 
 
-def test_the_budget_is_a_share_of_the_machine():
-    whole = room.machine_memory()
+def test_the_budget_is_a_share_of_the_machine(monkeypatch):
+    whole, free = room.memory()
+    assert whole > (free or 0) > 0
+    monkeypatch.setattr(room, "memory", lambda: (whole, whole))
     assert 2**29 < whole < 2**45
     assert room.budget(0) == max(512 << 20, int(whole / 6))
     assert room.budget(100) == 100 << 20
+    monkeypatch.setattr(room, "memory", lambda: (whole, whole // 8))
+    assert room.budget(0) == max(512 << 20, whole // 16)
+    monkeypatch.setattr(room, "memory", lambda: (whole, None))
+    assert room.budget(0) == max(512 << 20, int(whole / 6))
+
+
+def test_too_little_memory_is_seen_before_the_first_render(tmp_path, monkeypatch):
+    scene = small_scene(tmp_path)
+    monkeypatch.setattr(room, "memory", lambda: (8 << 30, 1 << 20))
+    rendered = []
+    with pytest.raises(SceneError, match=r"needs .* of memory, and 1 MB are free: close other"):
+        run(scene, lambda s: rendered.append(s) if "basis images" in s.text else None)
+    assert not rendered
+
+
+def test_the_button_says_what_a_capture_may_take(tmp_path):
+    """At most what it takes; and never an error."""
+    scene = small_scene(tmp_path)
+    scene.arto.keep, scene.arto.adaptive = "never", True
+    said = planned.guess(scene)
+    assert said.startswith("up to ") and "of disk while it runs" in said
+    assert "memory" in planned.guess(scene, short=True)
+    steps = capture.capture(scene, scene.view_layers[0].name, only_estimate=True)
+    estimate, most = work.run(steps), planned.most(scene)
+    assert most.memory >= estimate.memory > 0 and most.disk >= estimate.disk > 0
+    assert most.kept >= estimate.kept > 0
+    scene.arto.memory = 16
+    scene.render.resolution_x = 16384
+    assert "a single row of the picture takes" in planned.guess(scene)
