@@ -184,9 +184,9 @@ def test_the_budget_is_a_share_of_the_machine(monkeypatch):
 
 def test_too_little_memory_is_seen_before_the_first_render(tmp_path, monkeypatch):
     scene = small_scene(tmp_path)
-    monkeypatch.setattr(room, "memory", lambda: (8 << 30, 1 << 20))
+    monkeypatch.setattr(room, "memory", lambda: (8 << 30, 1 << 10))
     rendered = []
-    with pytest.raises(SceneError, match=r"needs .* of memory, and 1 MB are free: close other"):
+    with pytest.raises(SceneError, match=r"needs .* of memory, and 0 MB are free: close other"):
         run(scene, lambda s: rendered.append(s) if "basis images" in s.text else None)
     assert not rendered
 
