@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +15,12 @@ from .hemicube import Hemicube
 
 # Samples of a map that are worked on at a time, and of one whose bins are kept.
 BLOCK = 1 << 20
-KEPT = 1 << 23
+KEPT = 1 << 22
 _KEPT: dict[tuple, list[Samples]] = {}
 
 
-class Samples(NamedTuple):
+@dataclass(frozen=True)
+class Samples:
     """Some rows of a map's texels, sampled: which rows, how many samples a texel's side has, the
     bin of each sample (rows * finer, columns * finer; -1: no patch), and the solid angle of one of
     each row of samples."""
@@ -27,6 +29,13 @@ class Samples(NamedTuple):
     finer: int
     bins: NDArray[np.int32]
     weight: NDArray[np.float64]
+
+    @cached_property
+    def lit(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Of the samples that have a bin: which, and their solid angles."""
+        lit = self.bins.ravel() >= 0
+        index = self.bins.ravel()[lit].astype(np.intp)
+        return index, np.repeat(self.weight, self.bins.shape[1])[lit]
 
 
 def default_resolution(hemicube: Hemicube, environment: Environment) -> NDArray[np.intp]:

@@ -53,14 +53,21 @@ class PatchLight:
 
     def _collect(self, texels: NDArray, some: Samples, turn: float) -> None:
         """Add some rows of the map, turned, to the bins."""
-        lit = some.bins.ravel() >= 0
-        index = some.bins.ravel()[lit]
-        solid_angle = np.repeat(some.weight, some.bins.shape[1])[lit]
-        np.add.at(self._flat[:, 3], index, solid_angle)
+        index, solid_angle = some.lit
+        few = len(index) < len(self._flat) // 4
+
+        def add(c: int, values: NDArray) -> None:
+            if few:
+                np.add.at(self._flat[:, c], index, values)
+            else:
+                self._flat[:, c] += np.bincount(index, values, len(self._flat))
+
+        add(3, solid_angle)
+        everywhere = len(index) == some.bins.size
         for c in range(3):
             samples = np.repeat(texels[..., c], some.finer, axis=0)
-            samples = _turned(np.repeat(samples, some.finer, axis=1), turn).ravel()[lit]
-            np.add.at(self._flat[:, c], index, samples * solid_angle)
+            samples = _turned(np.repeat(samples, some.finer, axis=1), turn).ravel()
+            add(c, (samples if everywhere else samples[some.bins.ravel() >= 0]) * solid_angle)
 
     @property
     def resolution(self) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -12,6 +13,9 @@ from .field import Field
 from .field_tile import Model, Tile
 from .light import PatchLight
 from .region import Region
+
+# Lights that are added up at a time by who has many: more take memory, and save no more time.
+TOGETHER = 8
 
 
 def relight(
@@ -23,9 +27,21 @@ def relight(
     and read (default: all of it). -> (H, W, 4) float32 of the picture or the region, scene-linear
     radiance with premultiplied alpha; transparent outside the captured region. Linear in the light.
     """
+    return relights(field, [light], own, region)[0]
+
+
+def relights(
+    field: Field, lights: Sequence[PatchLight], own: float = 1.0, region: Region | None = None
+) -> list[NDArray[np.float32]]:
+    """The pictures under some lights, see `relight`: the field is read and unpacked once for all.
+
+    What is in memory is the pictures; so many lights at once as fit (`TOGETHER` are quick).
+    """
+    if not lights:
+        return []
     height, width = field.shape
     asked = region or Region(0, 0, width, height)
-    out = np.zeros((asked.height, asked.width, 4), np.float32)
+    outs = [np.zeros((asked.height, asked.width, 4), np.float32) for _ in lights]
     for tile in field.tiles:
         shared = tile.region.overlap(asked)
         if shared is None:
@@ -33,39 +49,49 @@ def relight(
         rows = slice(shared.y - tile.region.y, shared.y - tile.region.y + shared.height)
         columns = slice(shared.x - tile.region.x, shared.x - tile.region.x + shared.width)
         n = tile.region.width
-        picture = _light(tile, light, slice(rows.start * n, rows.stop * n)).reshape(-1, n, 3)
-        picture = picture[:, columns]
-        if own:
-            picture = picture + np.float32(own) * tile.layer("own", (rows, columns))
+        found = _light(tile, lights, slice(rows.start * n, rows.stop * n))
         alpha = tile.layer("alpha", (rows, columns))
+        lamps = np.float32(own) * tile.layer("own", (rows, columns)) if own else None
         at = Region(shared.x - asked.x, shared.y - asked.y, shared.width, shared.height)
-        out[at.slices] = np.dstack([picture, alpha])
-    return out
+        for out, pixels in zip(outs, found, strict=True):
+            picture = pixels.reshape(-1, n, 3)[:, columns]
+            if lamps is not None:
+                picture = picture + lamps
+            out[at.slices] = np.dstack([picture, alpha])
+    return outs
 
 
-def _light(tile: Tile, light: PatchLight, asked: slice) -> NDArray[np.float32]:
-    """The light of all patches on some pixels of a tile -> (n, 3)."""
+def _light(tile: Tile, lights: Sequence[PatchLight], asked: slice) -> NDArray[np.float32]:
+    """The light of all patches on some pixels of a tile -> (L, n, 3)."""
     tile.open()  # which may fail: here, and not in the threads
     # what all blocks share is worked out before the threads start
-    tables = _rest_tables(tile, light)
-    out = np.empty((asked.stop - asked.start, 3), np.float32)
-
+    tables = [_rest_tables(tile, light) for light in lights]
+    out = np.empty((len(lights), asked.stop - asked.start, 3), np.float32)
     rooms = [_Room() for _ in range(os.cpu_count() or 1)]
 
     def add(block: int) -> None:
         where = tile.blocks[block]
-        total = np.zeros((where.stop - where.start, 4), np.float32)
+        n = where.stop - where.start
         room = rooms.pop()
+        # one light: a pixel a row; more: by channel, and in a row the pixel's light of each
+        total = np.zeros((n, 4) if len(lights) == 1 else (3, n, len(lights)), np.float32)
         for model in tile.models:
             for k in np.flatnonzero(model.counts[block]).tolist():
-                room.add(total, model, block, k, light)
+                if len(lights) == 1:
+                    room.add(total, model, block, k, lights[0])
+                else:
+                    room.add_each(total, model, block, k, lights)
         rooms.append(room)
-        light_of = total[:, :3] * tile.ones(where)
-        if tables is not None:
-            light_of += _rest_light(tile, tables, where)
         inside = slice(max(where.start, asked.start), min(where.stop, asked.stop))
         first, last = inside.start - where.start, inside.stop - where.start
-        out[inside.start - asked.start : inside.stop - asked.start] = light_of[first:last]
+        to = slice(inside.start - asked.start, inside.stop - asked.start)
+        ones = tile.ones(where)
+        for i, of in enumerate(tables):
+            light_of = total[:, :3] if len(lights) == 1 else total[..., i].T
+            light_of = light_of * ones
+            if of is not None:
+                light_of += _rest_light(tile, of, where)
+            out[i, to] = light_of[first:last]
 
     blocks = [i for i, b in enumerate(tile.blocks) if b.stop > asked.start and b.start < asked.stop]
     with ThreadPoolExecutor(len(rooms)) as pool:
@@ -114,6 +140,48 @@ class _Room:
         for c in range(3):
             sums[:, c] += values[c]
         places[pixels] = ones
+
+    def add_each(
+        self,
+        totals: NDArray[np.float32],
+        model: Model,
+        block: int,
+        k: int,
+        lights: Sequence[PatchLight],
+    ) -> None:
+        """As `add`, of several lights to (3, n, L): what an entry is, is looked up once."""
+        at = model.at(block, k)
+        n = at.stop - at.start
+        shares = self._part("values", 3, n)
+        shares[...] = model.codes[:, at]
+        shares *= shares
+        pixels = model.pixels(block, k)
+        values, sums = self._part("each", n, len(lights)), self._part("sums", n, len(lights))
+        planes = [model.support.plane(light, k) for light in lights]
+        straight = [plane for plane in planes if plane is not None]
+        if len(straight) == len(lights):
+            constants, slopes = (np.stack(each, axis=-1) for each in zip(*straight, strict=True))
+            parameters = self._part("parameters", slopes.shape[1], n)
+            parameters[...] = model.parameters[:, at]
+
+            def average(c: int) -> None:
+                np.matmul(parameters.T, slopes[c] / model.end, out=values)
+                np.add(values, constants[c], out=values)
+
+        else:
+            of = model.parameters_of(at)
+            found = [model.support.average(light, k, of) for light in lights]
+
+            def average(c: int) -> None:
+                for i, each in enumerate(found):
+                    values[:, i] = each[:, c]
+
+        for c, total in enumerate(totals):
+            average(c)
+            values *= shares[c][:, None]
+            total.take(pixels, axis=0, out=sums, mode="clip")
+            sums += values
+            total[pixels] = sums
 
 
 def _rest_tables(tile: Tile, light: PatchLight) -> NDArray[np.float32] | None:

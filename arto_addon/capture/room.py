@@ -19,12 +19,13 @@ SHARE = 1 / 6
 # and at most this of what is free: the scene itself takes some of it, twice.
 FREE_SHARE = 1 / 2
 LEAST_MEGABYTES = 512
-# Bytes of a pixel: of a layer on disk; of each light group in Cycles' and in Blender's buffers; of
-# a patch while it is fitted; of what was fitted; of the layers that are no groups.
+# Bytes of a pixel, as measured (`python -m bench speed`): of a layer on disk; of each light group
+# in Cycles' and in Blender's buffers; of a patch while it is fitted; of what was fitted, its
+# proxies and what writing it takes; of the layers that are no groups.
 ON_DISK = 12
-PER_PASS = 24
-PER_PATCH = 4
-FITTED = 1600
+PER_PASS = 35
+PER_PATCH = 8
+FITTED = 4500
 OTHER_PASSES = 8
 # Of a field on disk, with its layers and proxies: of a pixel, and of each patch in it, about.
 FIELD, FIELD_PATCH = 62, 2.0

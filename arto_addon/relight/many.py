@@ -12,6 +12,7 @@ from typing import Any
 import bpy
 
 from ...core.errors import CaptureSetError, SceneError
+from ...core.relight import TOGETHER, relights
 from ...core.shot import Shot, safe_name
 from ..capture.sequence import frame_kept
 from ..shot import paths
@@ -19,7 +20,7 @@ from ..shot.shot import check_same_shot, shot_of
 from ..work import Progress, Steps
 from ..world.check import check_world
 from . import plate
-from .relight import Light, Shown, show
+from .relight import Light, Ready, Shown, finish, make_ready
 
 
 def relight_many(
@@ -49,30 +50,57 @@ def relight_many(
                 scene.frame_set(frame)
                 scene.view_layers[view_layer].update()
                 still = _shown(scene, view_layer, still)
-            for file in worlds or [None]:
-                for turn in range(turns):
-                    number = frame if frames else turn + 1 if turns > 1 else None
-                    with ExitStack() as lent:
-                        world = None
-                        if file:
-                            world = lent.enter_context(_world_of(file))
-                        if turns > 1:
-                            source = world or check_world(scene, view_layer)
-                            angle = 2 * math.pi * turn / turns
-                            world = lent.enter_context(turned(source, angle))
+            assert still is not None
+            every = [(file, turn) for file in worlds or [None] for turn in range(turns)]
+            for first in range(0, len(every), TOGETHER):
+                # the field is read once for so many lights
+                with ExitStack() as lent:
+                    ready: list[Ready] = []
+                    for file, turn in every[first : first + TOGETHER]:
+                        number = frame if frames else turn + 1 if turns > 1 else None
                         path = _named(base, file, number)
-                        text = f"picture {len(done) + 1} of {total}: {path.name}"
-                        yield Progress(len(done) / total, text)
-                        assert still is not None
+                        world = _lent(lent, scene, view_layer, file, turn / turns)
                         look = file.stem if file else scene.arto.look
-                        for step in show(still, Light(path, look, world)):
-                            # said once for all would be lost among them
-                            if not isinstance(step, Progress):
-                                step.share = len(done) / total
-                                yield step
-                    done.append(path)
+                        text = f"picture {len(done) + len(ready) + 1} of {total}: {path.name}"
+                        yield Progress(len(done) / total, text)
+                        steps = make_ready(still, Light(path, look, world))
+                        ready.append((yield from _quietly(steps, len(done) / total)))
+                    pictures = relights(still.field, [r.light for r in ready], 0.0)
+                    while ready:
+                        one = ready.pop(0)
+                        one.laps.go_on()
+                        steps = finish(still, one, pictures.pop(0))
+                        yield from _quietly(steps, len(done) / total)
+                        done.append(one.lit.path)
     yield Progress(1.0, f"wrote {len(done)} pictures, the last one {done[-1]}")
     return done
+
+
+def _quietly(steps: Steps, share: float) -> Steps:
+    """The steps but for what they say: said once for all, it would be lost among them."""
+    try:
+        while True:
+            step = next(steps)
+            if not isinstance(step, Progress):
+                step.share = share
+                yield step
+    except StopIteration as end:
+        return end.value
+    finally:
+        steps.close()
+
+
+def _lent(
+    lent: ExitStack, scene: bpy.types.Scene, view_layer: str, file: Path | None, turn: float
+) -> bpy.types.World | None:
+    """The world of a picture, for as long as it is lent; None for the scene's own.
+
+    turn: of the whole circle.
+    """
+    world = lent.enter_context(_world_of(file)) if file else None
+    if turn:
+        world = lent.enter_context(turned(world or check_world(scene, view_layer), turn * math.tau))
+    return world
 
 
 def relight_frames(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> Steps:

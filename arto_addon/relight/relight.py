@@ -70,7 +70,16 @@ class Shown:
                 near = paths.nearest(scene, view_layer)
                 check_same_shot(scene, near, "the reflectance field", view_layer)
         self.field = Field(folder)
+        self._changed: dict[tuple[int, float], list[str]] = {}
         self.held = self.field.about.get("route") == SAMPLED
+
+    def changed(self) -> list[str]:
+        """What of the scene is not as it was captured, at its frame."""
+        frame = self.scene.frame_current, self.scene.frame_subframe
+        if frame not in self._changed:
+            found = changed_since(self.scene, self.layer, self.field.about, now=True)
+            self._changed = {frame: found}
+        return self._changed[frame]
 
     @cached_property
     def guides(self) -> dict[str, NDArray]:
@@ -108,21 +117,58 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     return path, seconds
 
 
+@dataclass
+class Ready:
+    """A light, made ready to be shown in: its lamps are rendered, its bins are full.
+
+    whole: its environment; found: that without lamps, and these; parts: pictures of the lamps, none
+    or one; lamps: what was done with them, in words; together: whether they have nearly all light.
+    """
+
+    lit: Light
+    world: bpy.types.World
+    whole: Environment
+    found: Split
+    parts: list[NDArray[np.float32]]
+    lamps: str
+    together: bool
+    light: PatchLight
+    changed: list[str]
+    by_rays: str
+    laps: Laps
+
+
+class Laps:
+    """Seconds by part."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self.go_on()
+
+    def go_on(self) -> None:
+        """Count from now."""
+        self._last = time.perf_counter()
+
+    def lap(self, name: str) -> None:
+        now = time.perf_counter()
+        self.seconds[name] = now - self._last
+        self._last = now
+
+
 def show(shown: Shown, lit: Light) -> Steps:
     """Write the picture of a field in a light; returns seconds by part. Raises as `compute`."""
-    scene, layer, field, path = shown.scene, shown.layer, shown.field, lit.path
+    ready = yield from make_ready(shown, lit)
+    yield Progress(0.6, "relighting")
+    return (yield from finish(shown, ready, relight_field(shown.field, ready.light, 0.0)))
+
+
+def make_ready(shown: Shown, lit: Light) -> Steps:
+    """Bring a light to the patches -> `Ready`. Raises as `compute`."""
+    scene, layer, field = shown.scene, shown.layer, shown.field
     settings = scene.arto
     world = lit.world or check_world(scene, layer)
-    seconds: dict[str, float] = {}
-    last = time.perf_counter()
-
-    def lap(name: str) -> None:
-        nonlocal last
-        now = time.perf_counter()
-        seconds[name] = now - last
-        last = now
-
-    changed = changed_since(scene, layer, field.about, now=True)
+    laps = Laps()
+    changed = shown.changed()
     if changed:
         # allowed: it is the artist who knows whether it shows
         yield Progress(0.0, f"the scene is not the captured one: {'; '.join(changed[:3])}")
@@ -130,21 +176,27 @@ def show(shown: Shown, lit: Light) -> Steps:
     if by_rays := differs_by_rays(world):
         yield Progress(0.0, f"the world is {by_rays}")
     whole = kept.environment(scene, settings.environment_width, layer, lit.world)
-    lap("world")
+    laps.lap("world")
     found = split(whole, None if field.hemicube.closed else field.hemicube)
     parts, lamps, together = yield from _lamps(shown, found)
-    environment = found.rest if parts else whole
-    lap("lamps")
+    laps.lap("lamps")
     yield Progress(0.5, "bringing the environment to the patches")
-    light = PatchLight(environment, field.hemicube)
-    lap("light")
-    yield Progress(0.6, "relighting")
-    picture = relight_field(field, light, 0.0)
+    light = PatchLight(found.rest if parts else whole, field.hemicube)
+    laps.lap("light")
+    return Ready(lit, world, whole, found, parts, lamps, together, light, changed, by_rays, laps)
+
+
+def finish(shown: Shown, ready: Ready, picture: NDArray[np.float32]) -> Steps:
+    """Make the plate of what the field shows in a light, (H, W, 4), and write it; returns seconds
+    by part. Raises as `compute`."""
+    scene, field, lit = shown.scene, shown.field, ready.lit
+    settings, path, parts = scene.arto, lit.path, ready.parts
+    lap = ready.laps.lap
     if shown.held:
-        yield from _hold(shown, whole, picture, parts)
+        yield from _hold(shown, ready.whole, picture, parts)
     picture[..., :3] += np.float32(settings.own_lamps) * shown.own
     parts.append(picture[..., :3])
-    if together:
+    if ready.together:
         parts = [sum(parts)]
     lap("relight")
     denoised = "no"
@@ -163,24 +215,25 @@ def show(shown: Shown, lit: Light) -> Steps:
     np.maximum(picture, 0, out=picture)
     if not scene.render.film_transparent:
         yield Progress(0.8, "adding the world behind")
-        _behind(shown, lit, picture, found.share > LEAST_SHARE)
+        _behind(shown, lit, picture, ready.found.share > LEAST_SHARE)
         lap("background")
     yield Progress(0.9, f"writing {path}")
-    about = {"scene": scene.name, "world": world.name, "denoised": denoised, "lamps": lamps}
+    about = {"scene": scene.name, "world": ready.world.name, "denoised": denoised}
+    about["lamps"] = ready.lamps
     if scene.render.film_transparent and scene.cycles.film_transparent_glass:
         glass = "opaque: what is seen through it is in it, whatever Transparent Glass says"
         about["glass"] = glass
         yield Progress(0.9, f"glass: {glass}")
     about |= {
         "look": lit.look,
-        "world by rays": by_rays,
-        "changed since capture": "; ".join(changed),
+        "world by rays": ready.by_rays,
+        "changed since capture": "; ".join(ready.changed),
     }
     plate.write(scene, path, picture, {name: text for name, text in about.items() if text})
     lap("write")
     say = f" (denoised: {denoised})" if settings.denoise else ""
     yield Progress(1.0, f"wrote {path}{say}")
-    return seconds
+    return ready.laps.seconds
 
 
 def _lamps(shown: Shown, found: Split) -> Steps:

@@ -13,7 +13,7 @@ from arto.core.hemicube import Hemicube
 from arto.core.light import PatchLight
 from arto.core.patterns import ONE, U, V
 from arto.core.region import Region
-from arto.core.relight import over, relight
+from arto.core.relight import over, relight, relights
 from arto.core.supports import BOX, LINEAR, NOTHING, REST, WHOLE
 
 CUBE = Hemicube(patches=2)
@@ -216,3 +216,12 @@ def test_over() -> None:
     np.testing.assert_allclose(found, expected)
     np.testing.assert_array_equal(plate, kept)
     assert found.dtype == np.float32
+
+
+@pytest.mark.parametrize("choice", ["auto", "box", "linear", "whole"])
+def test_many_lights_at_once_are_each_of_them(fields, noisy, choice: str) -> None:
+    lights = [PatchLight(noisy(seed, 64), CUBE) for seed in range(3)]
+    together = relights(fields[choice], lights)
+    for light, picture in zip(lights, together, strict=True):
+        np.testing.assert_allclose(picture, relight(fields[choice], light), rtol=2e-6, atol=1e-7)
+    assert relights(fields[choice], []) == []
