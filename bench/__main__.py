@@ -170,7 +170,8 @@ def _field(options: argparse.Namespace) -> None:
 def _speed(options: argparse.Namespace) -> None:
     from .speed import speed, table
 
-    text = table(speed(options.json, options.quick, options.samples))
+    only = [(int(w), int(h)) for w, h in (size.split("x") for size in options.sizes or ())]
+    text = table(speed(options.json, options.quick, options.samples, only))
     if options.page:
         options.page.write_text(text + "\n", encoding="utf-8")
     print(text)
@@ -279,6 +280,7 @@ def main() -> int:
     c.add_argument("--json", type=Path, default=Path("out/speed.json"))
     c.add_argument("--quick", action="store_true", help="a few minutes: the smallest sizes")
     c.add_argument("--samples", type=int, default=64)
+    c.add_argument("--sizes", nargs="+", help="of its sizes these alone: 1920x1080")
     c.add_argument("--page", type=Path, help="a table in Markdown, to write")
     c.set_defaults(run=_speed)
 

@@ -80,10 +80,14 @@ def _run(name: str, size: Size, folder: Path, program: str = "") -> list[Row]:
     return [about | row for row in rows]
 
 
-def speed(out: Path, quick: bool, samples: int) -> list[Row]:
-    """All rows, written after every stage."""
+def speed(
+    out: Path, quick: bool, samples: int, only: list[tuple[int, int]] | None = None
+) -> list[Row]:
+    """All rows, written after every stage. only: of these sizes."""
     sizes = [(480, 270)] if quick else [(480, 270), (960, 540), (1920, 1080)]
     made = [(240, 135), (480, 270)] if quick else [*sizes, (3840, 2160)]
+    if only:
+        sizes, made = ([s for s in some if s in only] for some in (sizes, made))
     turns = 12 if quick else 72
     rows: list[Row] = []
 
@@ -112,10 +116,10 @@ def speed(out: Path, quick: bool, samples: int) -> list[Row]:
                 take("fits", size, folder)
         for i, (width, height) in enumerate(made):
             take("synthetic", Size(width, height, samples), _new(root / f"made_{i}"))
-        for patches in (PATCHES // 4, PATCHES // 2):
+        for patches in () if only else (PATCHES // 4, PATCHES // 2):
             size = replace(Size(*made[0], samples), patches=patches)
             take("synthetic", size, _new(root / f"patches_{patches}"))
-        if program := os.environ.get("BLENDER"):
+        if not only and (program := os.environ.get("BLENDER")):
             take("synthetic", Size(*made[0], samples), _new(root / "program"), program)
     rows += slopes(rows)
     write_rows(out, rows)

@@ -248,6 +248,7 @@ class _Seed:
         """(h, w, 3)."""
         number, layer = self.there[k, pattern]
         pixels = self.files[number].read(layer)
+        self.files[number].let_go(layer)
         if (k, pattern) not in self._looked:
             self._check(number, layer, pixels, (*self.of.shape, 3))
             self._looked.add((k, pattern))
@@ -261,6 +262,7 @@ class _Seed:
             file = self.files[number]
             if file.shape(layer) == image.shape and file.dtype(layer) == image.dtype:
                 file.read(layer, image)
+                file.let_go(layer)
                 if (k, name) not in self._looked:
                     self._check(number, layer, image, image.shape)
                     self._looked.add((k, name))
@@ -276,6 +278,7 @@ class _Seed:
             number, layer = self.there[k, name]
             for c, plane in enumerate(self.files[number].planes(layer)):
                 image[:, c] = plane[at]
+            self.files[number].let_go(layer)
         return out
 
     def add(self, k: int, images: NDArray, lit: NDArray) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import ExrError
-from .exr_layout import LayoutError, PlainPart
+from .exr_layout import LayoutError, PlainPart, forget
 from .exr_layout import check as check_layout
 from .exr_layout import plain as plain_parts
 from .files import whole
@@ -178,6 +178,12 @@ class Layers:
             for channel in channels:
                 del self._decoded[part].channels[channel]
         return self._filled(name, planes)
+
+    def let_go(self, name: str) -> None:
+        """A layer is not looked at for a while: what is mapped of it need not stay in memory."""
+        if self._plain:
+            there = self._plain[self._layers[name][0]]
+            forget(self._data, there.offset, there.offset + there.height * there.stride)
 
     def planes(self, name: str) -> list[NDArray]:
         """The channels of a layer, each (H, W), where they lie: not to be kept or written to."""

@@ -110,7 +110,19 @@ def _checked(data: mmap.mmap | bytes) -> tuple[list[_Part], list[NDArray], int]:
         at = end
     for number, (part, table) in enumerate(zip(parts, tables, strict=True)):
         _check_chunks(data, part, table, at, number if multipart else None)
+        if len(table) and isinstance(data, mmap.mmap):
+            # a word of each chunk was looked at, and all of the file would stay in memory
+            forget(data, int(table.min()), int(table.max()))
     return parts, tables, 8 if multipart else 4
+
+
+def forget(data: mmap.mmap, start: int, end: int) -> None:
+    """Give back the pages that lie in a stretch of a mapped file; they are read again when asked
+    for. Systems that have no such call do so by themselves when memory is short."""
+    first = -(-start // mmap.PAGESIZE) * mmap.PAGESIZE
+    length = min(end, len(data)) // mmap.PAGESIZE * mmap.PAGESIZE - first
+    if length > 0 and hasattr(data, "madvise"):
+        data.madvise(mmap.MADV_DONTNEED, first, length)
 
 
 def _headers(data: mmap.mmap | bytes, multipart: bool, tiled: bool) -> tuple[list[_Part], int]:

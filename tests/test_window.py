@@ -165,7 +165,7 @@ def test_what_an_artist_does_meanwhile_does_not_reach_the_capture(
     done = program.run("-b", other, "--command", "arto", "capture")
     assert done.returncode == 0, done.stderr
     expected = basis(peace)
-    assert len({name.split()[0] for name in expected}) == 4  # tiles
+    assert len({name.split()[0] for name in expected}) >= 4  # tiles
     w = open_window(blend)
     w.press("capture")
     w.wait("session.current is not None")

@@ -25,7 +25,7 @@ LEAST_MEGABYTES = 512
 ON_DISK = 12
 PER_PASS = 35
 PER_PATCH = 8
-FITTED = 4500
+FITTED = 3500
 OTHER_PASSES = 8
 # Of a field on disk, with its layers and proxies: of a pixel, and of each patch in it, about.
 FIELD, FIELD_PATCH = 62, 2.0
@@ -69,10 +69,8 @@ def budget(megabytes: int) -> int:
 def bytes_a_pixel(passes: int, patches: int, fitted: bool) -> int:
     """Memory that a pixel of a tile takes while the tile is rendered and, where captures are fitted
     as they come, the last one is fitted."""
-    every = passes + OTHER_PASSES
-    # the last one's file is mapped while it is read
-    fit = every * ON_DISK + patches * PER_PATCH + FITTED if fitted else 0
-    return every * PER_PASS + fit
+    fit = patches * PER_PATCH + FITTED if fitted else 0
+    return (passes + OTHER_PASSES) * PER_PASS + fit
 
 
 @dataclass(frozen=True)

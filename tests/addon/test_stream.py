@@ -121,11 +121,11 @@ def test_a_fit_that_fails_fails_the_capture(tmp_path, monkeypatch):
 
     scene = small_scene(tmp_path)
     scene.arto.keep = "never"
-    real = stream.write_tile
-    monkeypatch.setattr(stream, "write_tile", lambda *a: (_ for _ in ()).throw(OSError("no room")))
+    real = stream.fit_into
+    monkeypatch.setattr(stream, "fit_into", lambda *a: (_ for _ in ()).throw(OSError("no room")))
     with pytest.raises(OSError, match="no room"):
         run(scene)
-    monkeypatch.setattr(stream, "write_tile", real)
+    monkeypatch.setattr(stream, "fit_into", real)
     rendered = []
     run(scene, lambda s: rendered.append(s) if "basis images" in s.text else None)
     assert not rendered
