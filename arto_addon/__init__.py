@@ -6,13 +6,14 @@ import bpy
 
 from .job import session
 from .shot import scene_id, watch
-from .ui import cli, operators, panels, preferences, properties, window
+from .ui import cli, groups, operators, panels, preferences, properties, window
 
 _CLASSES = (
     *properties.CLASSES,
     *preferences.CLASSES,
     *operators.CLASSES,
     *panels.CLASSES,
+    *groups.CLASSES,
 )
 # In this order; the other way round to unregister.
 _MODULES = (properties, scene_id, watch, session, window, cli)

@@ -11,6 +11,7 @@ from ..core.errors import CaptureSetError, FieldError
 from ..core.field import Field
 from ..core.files import Lock
 from ..core.fit import fit as fit_captured
+from .capture import ground
 from .relight.denoise import cleaned
 from .shot import paths, status
 from .shot.shot import check_same_shot, layer_of, shot_of
@@ -25,6 +26,15 @@ def _is_fitted(captured: CaptureSet, folder: Path, choice: str, separate: bool) 
         return False
     then = about.get("key"), about.get("choice"), about.get("separate", False)
     return then[0] is not None and then == (captured.head.get("key"), choice, separate)
+
+
+def _fit_one(scene: bpy.types.Scene, captured: CaptureSet, target: Path) -> Steps:
+    settings = scene.arto
+    about = {"shot": captured.head.get("shot", {})}
+    work = fit_captured(captured, target, settings.support, settings.separate, **about)
+    for share, text in work:
+        yield Progress(share, text)
+    yield from cleaned(scene, target)
 
 
 def fit(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
@@ -59,11 +69,12 @@ def fit(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     # a capture set of the version before is read where it is; its field goes where fields are now
     target = (paths.claim(scene, layer) if place.earlier else place.folder) / "field"
     with Lock(target.parent, f"fitting {shot_of(scene, layer).title}"):
-        about = {"shot": captured.head.get("shot", {})}
-        work = fit_captured(captured, target, settings.support, settings.separate, **about)
-        for share, text in work:
-            yield Progress(share, text)
-        yield from cleaned(scene, target)
+        if captured.head.get("catchers"):
+            # first, so that no field of everything is there without that of its ground
+            beside = folder.parent / ground.FOLDER / "capture"
+            yield from _fit_one(scene, CaptureSet(beside), target.parent / ground.FOLDER / "field")
+            ground.add_outlines(beside, target.parent / ground.FOLDER / "field")
+        yield from _fit_one(scene, captured, target)
     paths.forget()
     yield Progress(1.0, f"fitted {len(captured.hemicube)} patches of {captured.pixels} pixels")
     return target

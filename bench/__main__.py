@@ -185,6 +185,17 @@ def _flicker(options: argparse.Namespace) -> None:
     print(f"look at {options.sheet}")
 
 
+def _plates(options: argparse.Namespace) -> None:
+    from .plates import plates, table
+
+    size = (options.width, options.width * 3 // 4)
+    rows = plates(options.json, options.quick, size, options.samples, options.many)
+    text = table(rows)
+    if options.page:
+        options.page.write_text(text + "\n", encoding="utf-8")
+    print(text)
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
@@ -292,6 +303,15 @@ def main() -> int:
     c.add_argument("--frames", type=int, default=24)
     c.add_argument("--samples", type=int, default=64)
     c.set_defaults(run=_flicker)
+
+    c = commands.add_parser("plates", help="shadow catchers beside Cycles' own")
+    c.add_argument("--json", type=Path, default=Path("out/plates.json"))
+    c.add_argument("--quick", action="store_true", help="two pairs of thing and ground")
+    c.add_argument("--width", type=int, default=112)
+    c.add_argument("--samples", type=int, default=128)
+    c.add_argument("--many", type=int, default=512, help="samples of each of two references")
+    c.add_argument("--page", type=Path, help="a table in Markdown, to write")
+    c.set_defaults(run=_plates)
 
     c = commands.add_parser("patterns", help="what each set of patterns can identify")
     c.set_defaults(run=_patterns)

@@ -41,12 +41,17 @@ class Picture:
 def new_scene(name: str, width: int, height: int) -> bpy.types.Scene:
     """One of `scenes.SCENES`, from nothing, with ARTO's settings on it."""
     scene = scenes.SCENES[name](width=width, height=height)
+    registered()
+    scene.arto.keep = "always"  # they are looked at in many ways
+    return scene
+
+
+def registered() -> None:
+    """ARTO's settings on every scene."""
     if not hasattr(bpy.types.Scene, "arto"):
         import arto
 
         arto.register()
-    scene.arto.keep = "always"  # they are looked at in many ways
-    return scene
 
 
 def render(scene: bpy.types.Scene, samples: int, seed: int, denoise: bool = False) -> Picture:

@@ -20,11 +20,14 @@ from .errors import CaptureSetError, ExrError
 from .hemicube import Hemicube
 from .patterns import PatternSet
 from .region import Region
+from .shot import safe_name
 
 # After ARTO there may be a number, where a light group of the artist's has the name without.
 GROUP = re.compile(r"(?:^|\.)Combined_ARTO(?:-\d+)?_(\d{4})_(\w+)$")
 # Layers beside the basis images, by the end of their part's name.
 GUIDES = {"albedo": "Denoising Albedo", "normal": "Denoising Normal", "depth": "Depth"}
+# The light groups of the scene's own lamps, as their artist named them.
+OWN_GROUP = re.compile(r"(?:^|\.)Combined_(.+)$")
 # The pattern that shows the noise: a patch of grains so fine that no reflection resolves them, half
 # of them lit, at random. A light path meets a lit grain or a dark one as a coin falls, so twice
 # this image less the white one is a sum of the paths' weights with random signs: its square is, on
@@ -41,10 +44,16 @@ def group_name(k: int, pattern: str) -> str:
     return f"ARTO_{k:04d}_{pattern}"
 
 
+def own_layer(group: str) -> str:
+    """The layer of the light of a group of the scene's own lamps."""
+    return f"own_{safe_name(group)}"
+
+
 @dataclass(frozen=True)
 class Around:
     """What a tile shows beside its patches. own: (h, w, 3), the light of the scene's own lamps;
-    alpha: (h, w); guides: albedo, normal (h, w, 3), depth (h, w), those that were captured."""
+    alpha: (h, w); guides: albedo, normal (h, w, 3), depth (h, w), those that were captured, and of
+    each light group of the scene's own lamps its `own_layer` (h, w, 3)."""
 
     own: NDArray[np.float32]
     alpha: NDArray[np.float32]
@@ -230,6 +239,8 @@ class _Seed:
                 elif layer == "Combined" or layer.endswith(".Combined"):
                     self.others.setdefault("Combined", (number, layer))
                     combined = True
+                elif match := OWN_GROUP.search(layer):
+                    self.others.setdefault(own_layer(match[1]), (number, layer))
                 else:
                     for guide, ending in GUIDES.items():
                         if layer == ending or layer.endswith("." + ending):
@@ -299,7 +310,7 @@ class _Seed:
         own = np.asarray(combined[..., :3] - lit)
         own[np.abs(own) < ROUNDING * lit] = 0
         guides = {}
-        for guide in GUIDES.keys() & self.others.keys():
+        for guide in self.others.keys() - {"Combined"}:
             number, layer = self.others[guide]
             pixels = self.files[number].read(layer)
             guides[guide] = pixels[..., 0] if pixels.shape[-1] == 1 else pixels

@@ -263,23 +263,53 @@ def write(
     A single layer named '' makes an ordinary one-part image. The file appears whole or not at
     all. Raises ExrError if the folder cannot be written or the disk is full.
     """
-    exr = _openexr()
-    parts = []
+    parts = [(name, _channels(pixels)) for name, pixels in layers.items()]
+    _write(path, parts, attributes, colour_space)
+
+
+def write_layered(
+    path: Path,
+    beauty: NDArray,
+    layers: dict[str, NDArray],
+    attributes: dict[str, Any] | None = None,
+    colour_space: str = "Linear Rec.709",
+) -> None:
+    """Write a picture (H, W, 4) and layers of it, (H, W, 3) each, into one part: the picture as
+    plain R, G, B, A, the layers as `name.R` and so on, as compositing programs look for them.
+
+    Raises ExrError as `write`.
+    """
+    channels = _channels(beauty)
     for name, pixels in layers.items():
-        pixels = np.asarray(pixels)
-        if pixels.dtype != np.float16:
-            pixels = pixels.astype(np.float32, copy=False)
-        planes = pixels[..., None] if pixels.ndim == 2 else pixels
-        names = {1: "Y", 3: "RGB", 4: "RGBA"}[planes.shape[-1]]
-        channels = {c: np.ascontiguousarray(planes[..., i]) for i, c in enumerate(names)}
-        head = {"compression": exr.ZIP_COMPRESSION, "type": exr.scanlineimage}
-        if colour_space in COLOUR_SPACES:
-            head["colorInteropID"] = COLOUR_SPACES[colour_space]
-        head["colorSpace"] = colour_space
-        parts.append(exr.Part({**head, **(attributes or {})}, channels, name))
+        channels |= {f"{name}.{c}": plane for c, plane in _channels(pixels).items()}
+    _write(path, [("", channels)], attributes, colour_space)
+
+
+def _channels(pixels: NDArray) -> dict[str, NDArray]:
+    """An image's planes by the names of its channels."""
+    pixels = np.asarray(pixels)
+    if pixels.dtype != np.float16:
+        pixels = pixels.astype(np.float32, copy=False)
+    planes = pixels[..., None] if pixels.ndim == 2 else pixels
+    names = {1: "Y", 3: "RGB", 4: "RGBA"}[planes.shape[-1]]
+    return {c: np.ascontiguousarray(planes[..., i]) for i, c in enumerate(names)}
+
+
+def _write(
+    path: Path,
+    parts: list[tuple[str, dict[str, NDArray]]],
+    attributes: dict[str, Any] | None,
+    colour_space: str,
+) -> None:
+    exr = _openexr()
+    head = {"compression": exr.ZIP_COMPRESSION, "type": exr.scanlineimage}
+    if colour_space in COLOUR_SPACES:
+        head["colorInteropID"] = COLOUR_SPACES[colour_space]
+    head["colorSpace"] = colour_space
+    made = [exr.Part({**head, **(attributes or {})}, channels, name) for name, channels in parts]
     try:
         with whole(path) as partial:
-            exr.File(parts).write(str(partial))
+            exr.File(made).write(str(partial))
             # the library says nothing when the last bytes find no room
             try:
                 _check_complete(partial)

@@ -25,8 +25,9 @@ _OF_A_MODEL = ("coefficient", "parameters", "pixels", "counts")
 _ABOUT: dict[str, type | tuple[type, ...]] = {
     "shot": dict, "fingerprint": dict, "view_layer": str, "key": str, "route": str, "choice": str,
     "samples": (int, float), "far": bool, "separate": bool, "guides": str, "proxy": int,
+    "catchers": list, "take": str, "pair": str,
 }  # fmt: skip
-LAYERS = ("own", "alpha", "albedo", "normal", "depth")
+LAYERS = ("own", "alpha", "albedo", "normal", "depth", "things")
 
 
 def proxy_folder(folder: Path, factor: int) -> Path:
@@ -115,6 +116,12 @@ class Field:
     def has_layer(self, name: str) -> bool:
         """Whether every tile has the layer."""
         return bool(self.tiles) and all(t.has_layer(name) for t in self.tiles)
+
+    @property
+    def own_layers(self) -> list[str]:
+        """The layers of light groups of the scene's own lamps, see `basis_images.own_layer`."""
+        found = {p.stem for tile in self.tiles for p in tile.folder.glob("own_*.npy")}
+        return sorted(name for name in found if self.has_layer(name))
 
     def layer(self, name: str) -> NDArray[np.float32]:
         """A layer of the whole picture, zero outside the tiles -> (H, W) or (H, W, 3)."""

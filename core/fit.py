@@ -115,7 +115,7 @@ def fit_into(
 def about_of(captured: CaptureSet, choice: str, separate: bool, **about: Any) -> dict[str, Any]:
     """What a field of a capture set says of itself, beside its tiles."""
     keep = ("scene", "colour_space", "samples", "file", "frame", "view_layer", "far", "key")
-    keep += ("fingerprint", "route", "shot")
+    keep += ("fingerprint", "route", "shot", "catchers", "take", "pair")
     known = {key: captured.head[key] for key in keep if key in captured.head}
     return {"choice": choice, "separate": separate} | known | about
 

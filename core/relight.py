@@ -31,11 +31,17 @@ def relight(
 
 
 def relights(
-    field: Field, lights: Sequence[PatchLight], own: float = 1.0, region: Region | None = None
+    field: Field,
+    lights: Sequence[PatchLight],
+    own: float = 1.0,
+    region: Region | None = None,
+    cut: bool = False,
 ) -> list[NDArray[np.float32]]:
     """The pictures under some lights, see `relight`: the field is read and unpacked once for all.
 
-    What is in memory is the pictures; so many lights at once as fit (`TOGETHER` are quick).
+    cut: no patch gives less than nothing, where a plane laid through a bright spot undershoots: for
+    what is divided by. What is in memory is the pictures; so many lights at once as fit (`TOGETHER`
+    are quick).
     """
     if not lights:
         return []
@@ -49,7 +55,7 @@ def relights(
         rows = slice(shared.y - tile.region.y, shared.y - tile.region.y + shared.height)
         columns = slice(shared.x - tile.region.x, shared.x - tile.region.x + shared.width)
         n = tile.region.width
-        found = _light(tile, lights, slice(rows.start * n, rows.stop * n))
+        found = _light(tile, lights, slice(rows.start * n, rows.stop * n), cut)
         alpha = tile.layer("alpha", (rows, columns))
         lamps = np.float32(own) * tile.layer("own", (rows, columns)) if own else None
         at = Region(shared.x - asked.x, shared.y - asked.y, shared.width, shared.height)
@@ -61,13 +67,15 @@ def relights(
     return outs
 
 
-def _light(tile: Tile, lights: Sequence[PatchLight], asked: slice) -> NDArray[np.float32]:
+def _light(
+    tile: Tile, lights: Sequence[PatchLight], asked: slice, cut: bool
+) -> NDArray[np.float32]:
     """The light of all patches on some pixels of a tile -> (L, n, 3)."""
     tile.open()  # which may fail: here, and not in the threads
     # what all blocks share is worked out before the threads start
     tables = [_rest_tables(tile, light) for light in lights]
     out = np.empty((len(lights), asked.stop - asked.start, 3), np.float32)
-    rooms = [_Room() for _ in range(os.cpu_count() or 1)]
+    rooms = [_Room(cut) for _ in range(os.cpu_count() or 1)]
 
     def add(block: int) -> None:
         where = tile.blocks[block]
@@ -103,8 +111,9 @@ class _Room:
     """Memory that a thread works in: making it anew for each patch would take longer than the sum,
     and hold up the other threads."""
 
-    def __init__(self) -> None:
+    def __init__(self, cut: bool) -> None:
         self._parts: dict[str, NDArray[np.float32]] = {}
+        self._least = np.float32(0 if cut else -np.inf)
 
     def _part(self, name: str, rows: int, n: int) -> NDArray[np.float32]:
         if name not in self._parts or self._parts[name].size < rows * n:
@@ -122,7 +131,8 @@ class _Room:
         values *= values
         plane = model.support.plane(light, k)
         if plane is None:
-            values *= model.support.average(light, k, model.parameters_of(at)).T
+            averages = model.support.average(light, k, model.parameters_of(at)).T
+            values *= np.maximum(averages, self._least)
         else:
             constant, slopes = plane
             parameters = self._part("parameters", slopes.shape[1], n)
@@ -130,6 +140,8 @@ class _Room:
             averages = self._part("averages", 3, n)
             np.matmul(slopes / model.end, parameters, out=averages)
             averages += constant[:, None]
+            if self._least == 0:
+                np.maximum(averages, 0, out=averages)
             values *= averages
         pixels = model.pixels(block, k)
         # as `total[pixels] += values.T`, but that a pixel is moved as one number of 16 bytes; clip
@@ -178,6 +190,8 @@ class _Room:
 
         for c, total in enumerate(totals):
             average(c)
+            if self._least == 0:
+                np.maximum(values, 0, out=values)
             values *= shares[c][:, None]
             total.take(pixels, axis=0, out=sums, mode="clip")
             sums += values

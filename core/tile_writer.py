@@ -155,6 +155,6 @@ def _halves(values: NDArray, unit: float) -> NDArray[np.float16]:
 
 def write_layer(folder: Path, name: str, pixels: NDArray) -> None:
     """Write one of `field.LAYERS` of a tile into its folder, whole or not at all."""
-    dtype = np.float32 if name in ("own", "depth") else np.float16
+    dtype = np.float32 if name == "depth" or name.startswith("own") else np.float16
     with whole(folder / f"{name}.npy") as partial, partial.open("wb") as f:
         np.save(f, pixels.astype(dtype))

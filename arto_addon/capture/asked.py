@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from ..shot.shot import shot_of
 from ..stage.bounds import Rendered, rendered
 from ..stage.settings import prepare
 from ..stage.stage import Stage, picture_region, stage
+from ..stage.takes import WHOLE, take
 from ..work import Steps
 from . import planes
 from .planned import Given, Planned, planned
@@ -50,7 +51,8 @@ def geometry(scene: bpy.types.Scene, seen: Rendered) -> Hemicube:
 @dataclass(frozen=True)
 class Asked:
     """A capture that was asked for, on its stage. hemicube: before it is refined; key: the same for
-    the very same capture alone; decides: what of it goes into the description."""
+    the very same capture alone; decides: what of it goes into the description; catchers: whether
+    there are shadow catchers, see `takes`."""
 
     scene: bpy.types.Scene
     view_layer: str
@@ -62,17 +64,21 @@ class Asked:
     found: dict[str, str]
     key: str
     decides: dict[str, Any]
+    catchers: bool
 
 
 @contextmanager
-def asked(scene: bpy.types.Scene, view_layer: str, given: Given | None = None) -> Iterator[Asked]:
-    """Set the stage for a capture. given: see there. Raises SceneError."""
+def asked(
+    scene: bpy.types.Scene, view_layer: str, given: Given | None = None, name: str = WHOLE
+) -> Iterator[Asked]:
+    """Set the stage for a capture. given: see there; name: of the take. Raises SceneError."""
     settings = scene.arto
     region = picture_region(scene)
     found = fingerprint(scene, view_layer, full=True)
-    with stage(scene, view_layer) as on:
+    with ExitStack() as held:
+        on = held.enter_context(stage(scene, view_layer))
         seen = rendered(on)
-        seen.check()
+        held.enter_context(take(seen, name))
         hemicube = given.hemicube if given else geometry(scene, seen)
         # between renders the paths differ, and grain would not be theirs
         grain = settings.grain and settings.route == "all"
@@ -91,6 +97,8 @@ def asked(scene: bpy.types.Scene, view_layer: str, given: Given | None = None) -
             "film_transparent": scene.render.film_transparent,
             "changed": on.changed,
         }
+        if seen.catchers:
+            decides |= {"catchers": sorted(set(seen.catchers)), "take": name}
         # names are not in it: a renamed file or scene goes on with what it has
         frame = [shot.camera_matrix, shot.lens, shot.frame, shot.subframe, shot.view_layer]
         everything: list[Any] = [
@@ -105,7 +113,10 @@ def asked(scene: bpy.types.Scene, view_layer: str, given: Given | None = None) -
         if settings.keep != "always":
             everything += [settings.keep_limit, settings.support, settings.separate]
         key = hashlib.sha256(json.dumps(everything, sort_keys=True).encode()).hexdigest()[:16]
-        yield Asked(scene, view_layer, on, hemicube, region, grain, shot, found, key, decides)
+        catchers = bool(seen.catchers)
+        yield Asked(
+            scene, view_layer, on, hemicube, region, grain, shot, found, key, decides, catchers
+        )
 
 
 def begun(this: Asked, folder: Path, given: Given | None, strips: int | None = None) -> Steps:

@@ -24,8 +24,9 @@ from ..relight.denoise import cleaned
 from ..shot import paths
 from ..shot.shot import shot_of
 from ..stage.stage import Stage, set_region
+from ..stage.takes import GROUND
 from ..work import Progress, Render, Steps
-from . import planes
+from . import ground, planes
 from .asked import asked, begun
 from .check import check_scene
 from .plan import SAMPLED, render_plan
@@ -87,17 +88,48 @@ def _capture(
         if head is None or only_estimate:
             plan, head = yield from begun(this, folder, given)
             if only_estimate:
-                return plan.estimate
+                return plan.estimate.twice if this.catchers else plan.estimate
             empty(folder)
         yield from _render_tiles(this.on, folder, head)
-    if not head["kept"]:
-        finish_field(folder, claimed / "field", head)
-        yield from cleaned(scene, claimed / "field")
-    finish(folder, claimed / "capture")
+    beside = claimed / ground.FOLDER
+    if this.catchers:
+        yield from _capture_ground(scene, view_layer, beside, head)
+    else:
+        empty(beside)
+    yield from _finish(scene, folder, claimed, head)
     paths.forget()
     caution = f". CAUTION: {head['caution']['text']}" if head.get("caution") else ""
     yield Progress(1.0, f"captured {head['patches']} patches{caution}")
     return claimed / "capture"
+
+
+def _capture_ground(
+    scene: bpy.types.Scene, view_layer: str, beside: Path, first: dict[str, Any]
+) -> Steps:
+    """Capture the catchers alone, for the take of everything that `first` describes."""
+    given = ground.given_by(first)
+    with asked(scene, view_layer, given, GROUND) as this:
+        folder = paths.unfinished_folder(beside, this.key)
+        head = unfinished(folder, this.key)
+        if head is None and ground.is_there(beside / "capture", this.key, first["key"]):
+            return
+        if head is None:
+            _, head = yield from begun(this, folder, given, len(first["tiles"]))
+            empty(folder)
+        head[ground.PAIR] = first["key"]
+        yield from _render_tiles(this.on, folder, head)
+    yield from ground.outlines(scene, view_layer, given, folder / ground.OUTLINES)
+    yield from _finish(scene, folder, beside, head)
+
+
+def _finish(scene: bpy.types.Scene, unfinished: Path, place: Path, head: dict[str, Any]) -> Steps:
+    """Put a complete take, and its field where it was fitted as it came, where the last one is."""
+    if not head["kept"]:
+        finish_field(unfinished, place / "field", head)
+        yield from cleaned(scene, place / "field")
+        if head.get("take") == GROUND:
+            ground.add_outlines(unfinished, place / "field")
+    finish(unfinished, place / "capture")
 
 
 def _render_tiles(on: Stage, folder: Path, head: dict[str, Any]) -> Steps:
@@ -153,7 +185,10 @@ def set_tile(
     """The stage ready for a render of some images of a tile, from a set's description."""
     set_region(on.scene, Region(*head["tiles"][number]["region"]))
     hemicube, patterns = Hemicube.from_json(head["hemicube"]), pattern_set(head["patterns"])
-    return planes.lit(on, hemicube, patterns, images, sampled=head["route"] == SAMPLED)
+    # the scene's own lamps are in every render; the first shows them by group
+    sampled = head["route"] == SAMPLED
+    own = not sampled and images == plan_of(head)[0]
+    return planes.lit(on, hemicube, patterns, images, sampled, own)
 
 
 def render_tile(on: Stage, head: dict[str, Any], number: int, folder: Path) -> Steps:

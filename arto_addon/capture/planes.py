@@ -206,11 +206,12 @@ def lit(
     patterns: PatternSet,
     images: Iterable[tuple[int, str]],
     sampled: bool = False,
+    own: bool = False,
 ) -> Iterator[None]:
     """The stage with the planes of these images around it and their light groups to write.
 
     sampled: Cycles also casts shadow rays at the patches, as it does at a world; then there may be
-    `MOST_SAMPLED` of them.
+    `MOST_SAMPLED` of them. own: with the artist's light groups.
     """
     made: list[Any] = []
     images = list(images)
@@ -230,6 +231,9 @@ def lit(
         collection = note(bpy.data.collections.new("ARTO Capture"))
         on.scene.collection.children.link(collection)
         build(collection, hemicube, patterns, images, note, free_mark(), sampled)
+        # first: they are sampled, and of those Cycles can only tell the first groups apart
+        for name in on.own_groups if own else ():
+            layer.lightgroups.add(name=name)
         for plane in collection.objects:
             layer.lightgroups.add(name=plane.lightgroup)
         yield

@@ -88,6 +88,13 @@ class Estimate:
         return asdict(self)
 
     @property
+    def twice(self) -> Estimate:
+        """Of a shot with shadow catchers, of which there are two takes."""
+        seconds = None if self.seconds is None else 2 * self.seconds
+        disk, kept = self.disk + self.kept, 2 * self.kept
+        return Estimate(seconds, self.memory, disk, kept, 2 * self.renders + 1)
+
+    @property
     def line(self) -> str:
         """In words."""
         time = f"about {clock(self.seconds)}, " if self.seconds is not None else ""

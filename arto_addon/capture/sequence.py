@@ -21,6 +21,7 @@ from ...core.refine import refine
 from ..stage.bounds import rendered
 from ..stage.settings import prepare
 from ..stage.stage import stage
+from ..stage.takes import WHOLE, take
 from ..work import Progress, Render, Steps
 from . import planes, probe
 from .capture import capture
@@ -83,7 +84,6 @@ def together(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> 
         check_scene(scene, view_layer)
         with stage(scene, view_layer) as on:
             seen = rendered(on)
-        seen.check()
         low, high = np.minimum(low, seen.low), np.maximum(high, seen.high)
     seen.low, seen.high = low, high
     settings = scene.arto
@@ -93,7 +93,7 @@ def together(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> 
     route, caution, probes = settings.route, None, []
     for frame in some:
         scene.frame_set(frame)
-        with stage(scene, view_layer) as on:
+        with stage(scene, view_layer) as on, take(rendered(on), WHOLE):
             prepare(on, layers=len(pattern_set(settings.patterns)) + settings.grain)
             here, told = yield from light_route(on, hemicube)
             route = SAMPLED if here == SAMPLED else route

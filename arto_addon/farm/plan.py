@@ -54,6 +54,11 @@ def plan(
             scene.frame_set(frame)
             check_scene(scene, view_layer)
             with asked(scene, view_layer, given) as this:
+                if this.catchers:
+                    raise FarmError(
+                        "this shot has shadow catchers, which are captured on one machine: use "
+                        "Capture, or turn Shadow Catcher off"
+                    )
                 there = folder / f"frame_{frame:04d}"
                 planned, head = yield from begun(this, folder, given, tiles)
             # every frame is cut as the first one is

@@ -20,6 +20,7 @@ from ...core.field_writer import write_head
 from ...core.tile_writer import write_layer
 from ..blender.output import float_exr, write_to
 from ..work import Progress, Render, Steps, blocking_render
+from .plate import mixed
 
 _available: list[bool] = []
 
@@ -77,17 +78,6 @@ def cleaned(scene: bpy.types.Scene, folder: Path) -> Steps:
 _DENOISER = ("compositor_denoise_device", "compositor_denoise_final_quality")
 
 
-def _sum(tree: Any, one: Any, other: Any) -> Any:
-    """The sum of two colours in a compositor tree."""
-    node = tree.nodes.new("ShaderNodeMix")
-    node.data_type, node.blend_type, node.clamp_factor = "RGBA", "ADD", False
-    sockets = [s for s in node.inputs if s.enabled]
-    sockets[0].default_value = 1.0
-    tree.links.new(one, sockets[1])
-    tree.links.new(other, sockets[2])
-    return next(s for s in node.outputs if s.enabled)
-
-
 def denoise(
     guides: dict[str, NDArray],
     *pictures: NDArray[np.float32],
@@ -134,7 +124,9 @@ def denoise(
                 noisy = source(f"picture{i}", picture, bpy.data.colorspace.working_space)
                 for name, socket in {"Image": noisy, **steer}.items():
                     tree.links.new(socket, node.inputs[name])
-                total = node.outputs[0] if total is None else _sum(tree, total, node.outputs[0])
+                total = (
+                    node.outputs[0] if total is None else mixed(tree, "ADD", total, node.outputs[0])
+                )
             out = tree.nodes.new("NodeGroupOutput")
             tree.links.new(total, out.inputs[0])
             studio.compositing_node_group = tree

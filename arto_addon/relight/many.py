@@ -19,7 +19,7 @@ from ..shot import paths
 from ..shot.shot import check_same_shot, shot_of
 from ..work import Progress, Steps
 from ..world.check import check_world
-from . import plate
+from .present import present_frames
 from .relight import Light, Ready, Shown, finish, make_ready
 
 
@@ -65,7 +65,10 @@ def relight_many(
                         yield Progress(len(done) / total, text)
                         steps = make_ready(still, Light(path, look, world))
                         ready.append((yield from _quietly(steps, len(done) / total)))
-                    pictures = relights(still.field, [r.light for r in ready], 0.0)
+                    lights = [r.light for r in ready]
+                    cut = still.ground is not None
+                    by_field = [relights(f, lights, 0.0, cut=cut) for f in still.fields]
+                    pictures = [list(takes) for takes in zip(*by_field, strict=True)]
                     while ready:
                         one = ready.pop(0)
                         one.laps.go_on()
@@ -107,7 +110,7 @@ def relight_frames(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int
     """Relight the frames of a shot, or of an animated world over a still, and show them as a
     sequence in the compositor; returns their paths. Raises as `relight_many`."""
     done = yield from relight_many(scene, view_layer, frames=frames)
-    plate.present_frames(scene, done[0], frames)
+    present_frames(scene, done[0], frames)
     return done
 
 

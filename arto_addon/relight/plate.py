@@ -1,8 +1,7 @@
-"""The relit plate in Blender: an EXR, an image that shows it, and a compositor node group."""
+"""The relit plate: its EXR files, and the image and the compositor node group that show it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,10 @@ from .header import header
 IMAGE = "ARTO Relit"
 # The image node in a plate's group.
 SOURCE = "ARTO Relit"
+# And that of how much a plate with shadow catchers shows of what is behind.
+SHARE = "ARTO Catcher"
+# Of such a plate's header, and of one that has layers.
+CATCHER, LAYERS = "arto.shadow catchers", "arto.layers"
 
 
 def write(
@@ -24,53 +27,34 @@ def write(
 ) -> None:
     """Write the plate: (H, W, 4) scene-linear, premultiplied. The header names its colour space,
     and has what Blender's own render of the scene would have in it."""
-    space = bpy.data.colorspace.working_space
+    exr.write(path, {"": picture}, *header_of(scene, about))
+
+
+def header_of(scene: bpy.types.Scene, about: dict[str, str]) -> tuple[dict[str, Any], str]:
+    """A plate's header and colour space."""
     attributes = header(scene) | {f"arto.{k}": v for k, v in about.items()}
-    exr.write(path, {"": picture}, attributes, space)
+    return attributes, bpy.data.colorspace.working_space
+
+
+def share_file(path: Path) -> Path:
+    """Beside a plate with shadow catchers: how much of what is behind it is seen, by colour."""
+    return path.with_name(f"{path.stem}_catcher.exr")
+
+
+def layers_file(path: Path) -> Path:
+    """Beside a plate: what each part of its light gives to it."""
+    return path.with_name(f"{path.stem}_layers.exr")
+
+
+def comp_file(path: Path) -> Path:
+    """Beside a plate with shadow catchers: it in the artist's footage."""
+    return path.with_name(f"{path.stem}_comp.exr")
 
 
 def name_of(scene: bpy.types.Scene, look: str | None = None) -> str:
     """The name of the plate's image and node group: of this scene and look, and no other's."""
     name = paths.relit_name(scene, look)
     return f"ARTO {name}" if name else IMAGE
-
-
-def present(scene: bpy.types.Scene, path: Path, look: str | None = None) -> bpy.types.Image:
-    """Show a plate that was written: its image, and its node in the scene's compositor.
-
-    look: that it was made for (default: the scene's now). In the window that is one step that can
-    be undone.
-    """
-    name = name_of(scene, look)
-    image = show(path, name)
-    if wire(scene, node_group(image, name)) is None:
-        tree = scene.compositing_node_group.name
-        print(f"ARTO: the compositor '{tree}' is linked and stays as it is: add '{name}' to it")
-    if not bpy.app.background and bpy.context.window_manager.windows:
-        bpy.ops.ed.undo_push(message="Relight")
-    return image
-
-
-def present_frames(
-    scene: bpy.types.Scene, first: Path, frames: Sequence[int], look: str | None = None
-) -> bpy.types.Image:
-    """Show plates of frames, numbered as `many` numbers them, as a sequence: an image and its node,
-    which at each frame of the scene show that frame's.
-
-    first: the first frame's file. They stand beside the plate of a single frame.
-    """
-    name = f"{name_of(scene, look)} Frames"
-    image = show(first, name)
-    image.source = "SEQUENCE"
-    group = node_group(image, name)
-    if source := group.nodes.get(SOURCE):
-        source.frame_duration = frames[-1] - frames[0] + 1
-        source.frame_start = frames[0]
-        # a sequence counts its files from 1
-        source.frame_offset = frames[0] - 1
-        source.use_auto_refresh = True
-    wire(scene, group)
-    return image
 
 
 def show(path: Path, name: str = IMAGE) -> bpy.types.Image:
@@ -92,8 +76,13 @@ def show(path: Path, name: str = IMAGE) -> bpy.types.Image:
     return image
 
 
-def node_group(image: bpy.types.Image, name: str = IMAGE) -> Any:
-    """The compositor node group that shows a plate; made once, then kept up to date."""
+def node_group(
+    image: bpy.types.Image, name: str = IMAGE, share: bpy.types.Image | None = None
+) -> Any:
+    """The compositor node group that shows a plate; made once, then kept up to date.
+
+    share: of a plate with shadow catchers, which the group puts into footage.
+    """
     tree = bpy.data.node_groups.get(name)
     if tree is None or tree.bl_idname != "CompositorNodeTree":
         tree = bpy.data.node_groups.new(name, "CompositorNodeTree")
@@ -108,41 +97,40 @@ def node_group(image: bpy.types.Image, name: str = IMAGE) -> Any:
     source = tree.nodes.get(SOURCE)
     if source:
         source.image = image
+    if share and source:
+        add_footage(tree, source.outputs["Image"], share)
     return tree
 
 
-def wire(scene: bpy.types.Scene, group: Any) -> Any:
-    """Put the node group into the scene's compositor, seen through the viewer; return its node.
+def add_footage(tree: Any, things: Any, share: bpy.types.Image) -> None:
+    """To a group that shows a plate, if it has it not: footage goes in, and comes out behind the
+    things, a socket of the tree, and in their shadows."""
+    if SHARE in tree.nodes:
+        tree.nodes[SHARE].image = share
+        return
+    tree.interface.new_socket("Footage", in_out="INPUT", socket_type="NodeSocketColor")
+    for name in ("Composite", "Shadow Catcher"):
+        tree.interface.new_socket(name, in_out="OUTPUT", socket_type="NodeSocketColor")
+    shown = tree.nodes.new("CompositorNodeImage")
+    shown.name, shown.location, shown.image = SHARE, (0, -400), share
+    footage = tree.nodes.new("NodeGroupInput")
+    footage.location = (-200, -300)
+    seen = mixed(tree, "MULTIPLY", footage.outputs["Footage"], shown.outputs["Image"])
+    whole = mixed(tree, "ADD", things, seen)
+    out = next(n for n in tree.nodes if n.bl_idname == "NodeGroupOutput")
+    tree.links.new(whole, out.inputs["Composite"])
+    tree.links.new(shown.outputs["Image"], out.inputs["Shadow Catcher"])
 
-    What the compositor puts out stays what it was: an artist's tree gains the node, and a viewer
-    if it had none; a scene without a compositor gets one that passes its render on. A tree linked
-    from a library is left alone (-> None): the plate's node group can be added where it is made.
-    """
-    tree = scene.compositing_node_group
-    if tree is None:
-        tree = bpy.data.node_groups.new("ARTO Compositor", "CompositorNodeTree")
-        tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
-        render = tree.nodes.new("CompositorNodeRLayers")
-        render.scene = scene
-        out = tree.nodes.new("NodeGroupOutput")
-        out.location = (500, 0)
-        tree.links.new(render.outputs["Image"], out.inputs["Image"])
-        scene.compositing_node_group = tree
-    if not tree.is_editable:
-        return None  # a library's: an edit of it would be gone with the next save
-    node = next(
-        (n for n in tree.nodes if n.bl_idname == "CompositorNodeGroup" and n.node_tree == group),
-        None,
-    )
-    if node is None:
-        below = min((n.location.y - max(n.height, 200) for n in tree.nodes), default=0.0)
-        node = tree.nodes.new("CompositorNodeGroup")
-        node.node_tree = group
-        node.label = group.name
-        node.width = 200
-        node.location = (0, below - 40)
-        if not any(n.bl_idname == "CompositorNodeViewer" for n in tree.nodes):
-            viewer = tree.nodes.new("CompositorNodeViewer")
-            viewer.location = (node.location.x + 500, node.location.y)
-            tree.links.new(node.outputs["Image"], viewer.inputs["Image"])
-    return node
+
+def mixed(tree: Any, how: str, one: Any, other: Any) -> Any:
+    """The sum or product of two colours in a compositor tree, a socket."""
+    node = tree.nodes.new("ShaderNodeMix")
+    node.data_type, node.blend_type, node.clamp_factor = "RGBA", how, False
+    sockets = [s for s in node.inputs if s.enabled]
+    sockets[0].default_value = 1.0
+    for socket in sockets[1:]:
+        # what is shown of a layer that is gone
+        socket.default_value = (0, 0, 0, 1)
+    tree.links.new(one, sockets[1])
+    tree.links.new(other, sockets[2])
+    return next(s for s in node.outputs if s.enabled)

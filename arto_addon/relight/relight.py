@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,13 +13,15 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.catcher import Caught, catch
 from ...core.environment import Environment
+from ...core.errors import FieldError
 from ...core.field import Field
 from ...core.lamps import Split, split
 from ...core.light import PatchLight
 from ...core.region import Region
-from ...core.relight import over
-from ...core.relight import relight as relight_field
+from ...core.relight import over, relights
+from ..capture import ground
 from ..capture.plan import SAMPLED
 from ..shot import paths
 from ..shot.shot import check_same_shot, layer_of
@@ -28,7 +31,9 @@ from ..world import kept
 from ..world.background import background, background_with_holes, holds_out
 from ..world.check import check_world, differs_by_rays
 from ..world.lamp_render import brightness, lamp_light, region_of
-from . import denoise, plate
+from . import denoise, layers, plate
+from .footage import footage
+from .present import present
 
 # From this share of the light on the lamps are the picture, and what the field adds is denoised
 # with them: by themselves, beside darkness, they come out of the denoiser worse (docs/accuracy.md).
@@ -72,6 +77,21 @@ class Shown:
         self.field = Field(folder)
         self._changed: dict[tuple[int, float], list[str]] = {}
         self.held = self.field.about.get("route") == SAMPLED
+        self.ground: Shown | None = None
+        if self.field.about.get("catchers") and not self.field.about.get("take"):
+            self.ground = self._ground(folder)
+
+    def _ground(self, folder: Path) -> Shown:
+        """The take of the shadow catchers alone. Raises FieldError."""
+        beside = folder.parent / ground.FOLDER / "field"
+        found = Shown(self.scene, self.layer, beside)
+        pair, key = found.field.about.get(ground.PAIR), self.field.about.get("key")
+        if pair != key or not found.field.has_layer(ground.LAYER):
+            raise FieldError(
+                f"the shadow catchers in {beside} were captured for another picture: run Capture "
+                "again, it goes on where it stopped"
+            )
+        return found
 
     def changed(self) -> list[str]:
         """What of the scene is not as it was captured, at its frame."""
@@ -80,6 +100,11 @@ class Shown:
             found = changed_since(self.scene, self.layer, self.field.about, now=True)
             self._changed = {frame: found}
         return self._changed[frame]
+
+    @property
+    def fields(self) -> list[Field]:
+        """The fields of its takes."""
+        return [self.field, *([self.ground.field] if self.ground else [])]
 
     @cached_property
     def guides(self) -> dict[str, NDArray]:
@@ -91,13 +116,13 @@ class Shown:
 
 
 def relight(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
-    """Relight the scene's field with its world and show it: `compute`, then `plate.present`.
+    """Relight the scene's field with its world and show it: `compute`, then `present.present`.
 
     Raises what `compute` raises; nothing of the scene changes but the plate's image and its node in
     the compositor.
     """
     path, seconds = yield from compute(scene, view_layer)
-    plate.present(scene, path)
+    present(scene, path)
     return path, seconds
 
 
@@ -122,7 +147,8 @@ class Ready:
     """A light, made ready to be shown in: its lamps are rendered, its bins are full.
 
     whole: its environment; found: that without lamps, and these; parts: pictures of the lamps, none
-    or one; lamps: what was done with them, in words; together: whether they have nearly all light.
+    or one, and ground_parts those of shadow catchers alone; lamps: what was done with them, in
+    words; together: whether they have nearly all light.
     """
 
     lit: Light
@@ -130,6 +156,7 @@ class Ready:
     whole: Environment
     found: Split
     parts: list[NDArray[np.float32]]
+    ground_parts: list[NDArray[np.float32]]
     lamps: str
     together: bool
     light: PatchLight
@@ -159,7 +186,9 @@ def show(shown: Shown, lit: Light) -> Steps:
     """Write the picture of a field in a light; returns seconds by part. Raises as `compute`."""
     ready = yield from make_ready(shown, lit)
     yield Progress(0.6, "relighting")
-    return (yield from finish(shown, ready, relight_field(shown.field, ready.light, 0.0)))
+    cut = shown.ground is not None
+    pictures = [relights(field, [ready.light], 0.0, cut=cut)[0] for field in shown.fields]
+    return (yield from finish(shown, ready, pictures))
 
 
 def make_ready(shown: Shown, lit: Light) -> Steps:
@@ -172,6 +201,8 @@ def make_ready(shown: Shown, lit: Light) -> Steps:
     if changed:
         # allowed: it is the artist who knows whether it shows
         yield Progress(0.0, f"the scene is not the captured one: {'; '.join(changed[:3])}")
+    if shown.ground:
+        footage(scene)  # what cannot be read is said before the long work
     yield Progress(0.0, "bringing the world to an environment map")
     if by_rays := differs_by_rays(world):
         yield Progress(0.0, f"the world is {by_rays}")
@@ -179,31 +210,47 @@ def make_ready(shown: Shown, lit: Light) -> Steps:
     laps.lap("world")
     found = split(whole, None if field.hemicube.closed else field.hemicube)
     parts, lamps, together = yield from _lamps(shown, found)
+    ground_parts = []
+    if shown.ground and parts:
+        ground_parts, _, _ = yield from _lamps(shown.ground, found)
     laps.lap("lamps")
     yield Progress(0.5, "bringing the environment to the patches")
     light = PatchLight(found.rest if parts else whole, field.hemicube)
     laps.lap("light")
-    return Ready(lit, world, whole, found, parts, lamps, together, light, changed, by_rays, laps)
+    return Ready(
+        lit,
+        world,
+        whole,
+        found,
+        parts,
+        ground_parts,
+        lamps,
+        together,
+        light,
+        changed,
+        by_rays,
+        laps,
+    )
 
 
-def finish(shown: Shown, ready: Ready, picture: NDArray[np.float32]) -> Steps:
-    """Make the plate of what the field shows in a light, (H, W, 4), and write it; returns seconds
-    by part. Raises as `compute`."""
-    scene, field, lit = shown.scene, shown.field, ready.lit
-    settings, path, parts = scene.arto, lit.path, ready.parts
+def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> Steps:
+    """Make the plate of what the fields of a shot show in a light, (H, W, 4) each, and write it;
+    returns seconds by part. Raises as `compute`."""
+    scene, lit = shown.scene, ready.lit
+    settings, path = scene.arto, lit.path
     lap = ready.laps.lap
-    if shown.held:
-        yield from _hold(shown, ready.whole, picture, parts)
-    picture[..., :3] += np.float32(settings.own_lamps) * shown.own
-    parts.append(picture[..., :3])
-    if ready.together:
-        parts = [sum(parts)]
+    picture, parts = pictures[0], ready.parts
+    parts = yield from _with_own(shown, ready, picture, parts)
+    beside: list[NDArray] = []
+    if shown.ground:
+        beside = yield from _with_own(shown.ground, ready, pictures[1], ready.ground_parts)
     lap("relight")
     denoised = "no"
     if settings.denoise:
         yield Progress(0.7, "denoising")
         if denoise.available():
-            parts = [denoise.denoise(shown.guides, *parts, clean=denoise.clean(field), like=scene)]
+            parts = _denoised(shown, parts)
+            beside = _denoised(shown.ground, beside) if shown.ground else []
             denoised = "Open Image Denoise"
         else:
             # said here, in the file's header and in the last line
@@ -213,6 +260,14 @@ def finish(shown: Shown, ready: Ready, picture: NDArray[np.float32]) -> Steps:
     picture[..., :3] = sum(parts)
     # a plane laid through a sun beside darkness undershoots; a picture has no negative light
     np.maximum(picture, 0, out=picture)
+    caught = None
+    if shown.ground:
+        under = np.maximum(sum(beside), 0)
+        covered = shown.ground.field.layer(ground.LAYER)
+        caught = catch(picture[..., :3], under, covered, pictures[1][..., 3])
+        picture = caught.plate
+        lap("catcher")
+    things = picture[..., :3].copy()
     if not scene.render.film_transparent:
         yield Progress(0.8, "adding the world behind")
         _behind(shown, lit, picture, ready.found.share > LEAST_SHARE)
@@ -229,11 +284,53 @@ def finish(shown: Shown, ready: Ready, picture: NDArray[np.float32]) -> Steps:
         "world by rays": ready.by_rays,
         "changed since capture": "; ".join(ready.changed),
     }
-    plate.write(scene, path, picture, {name: text for name, text in about.items() if text})
+    about = {name: text for name, text in about.items() if text}
+    if caught:
+        about[plate.CATCHER.removeprefix("arto.")] = "footage * catcher + RGB"
+    if settings.layers != "OFF":
+        about[plate.LAYERS.removeprefix("arto.")] = plate.layers_file(path).name
+    plate.write(scene, path, picture, about)
+    if caught:
+        plate.write(scene, plate.share_file(path), caught.share, about)
+        yield from _into_footage(shown, caught, path, about)
+    if settings.layers != "OFF":
+        found = yield from layers.of_plate(shown, ready, caught)
+        if not scene.render.film_transparent:
+            found[layers.BEHIND] = picture[..., :3] - things
+        yield from layers.write(scene, path, picture, found, *plate.header_of(scene, about))
     lap("write")
     say = f" (denoised: {denoised})" if settings.denoise else ""
     yield Progress(1.0, f"wrote {path}{say}")
     return ready.laps.seconds
+
+
+def _with_own(
+    shown: Shown, ready: Ready, picture: NDArray[np.float32], parts: list[NDArray[np.float32]]
+) -> Steps:
+    """The pictures that a take's plate is the sum of: of what its field shows, (H, W, 4), with the
+    scene's own lamps, and of the lamps of the world."""
+    if shown.held:
+        yield from _hold(shown, ready.whole, picture, parts)
+    picture[..., :3] += np.float32(shown.scene.arto.own_lamps) * shown.own
+    parts = [*parts, picture[..., :3]]
+    return [sum(parts)] if ready.together else parts
+
+
+def _denoised(shown: Shown, parts: list[NDArray]) -> list[NDArray]:
+    clean = denoise.clean(shown.field)
+    return [denoise.denoise(shown.guides, *parts, clean=clean, like=shown.scene)]
+
+
+def _into_footage(
+    shown: Shown, caught: Caught, path: Path, about: dict[str, str]
+) -> Iterator[Progress]:
+    """Write the things in the artist's footage, where there is some."""
+    found = footage(shown.scene)
+    if found is None:
+        return
+    yield Progress(0.9, f"putting it into the footage: {found.name}")
+    comp = caught.over(found.read(shown.scene))
+    plate.write(shown.scene, plate.comp_file(path), comp, about | {"footage": found.name})
 
 
 def _lamps(shown: Shown, found: Split) -> Steps:

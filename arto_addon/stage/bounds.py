@@ -17,15 +17,23 @@ from ...core.errors import SceneError
 from ..work import last_properties_kept
 from .stage import Stage
 
+# An object's name, and the file of its library or nothing.
+Name = tuple[str, str]
+
 
 @dataclass
 class Rendered:
     """low, high: the corners (3,) of all that a render shows; catchers: the names of its shadow
-    catchers."""
+    catchers, as they are rendered; flagged: the objects that make them be some, and things: those
+    of all else, each by name and library."""
 
     low: NDArray[np.float64] = field(default_factory=lambda: np.full(3, np.inf))
     high: NDArray[np.float64] = field(default_factory=lambda: np.full(3, -np.inf))
     catchers: list[str] = field(default_factory=list)
+    flagged: set[Name] = field(default_factory=set)
+    things: set[Name] = field(default_factory=set)
+    # what makes instances of catchers
+    makers: set[Name] = field(default_factory=set)
 
     def bounds(self) -> tuple[tuple[float, float, float], float]:
         """Centre and radius. Raises SceneError where there is nothing to see."""
@@ -36,12 +44,32 @@ class Rendered:
         return tuple(float(x) for x in centre), max(radius, 1e-6)
 
     def check(self) -> None:
-        """Raise SceneError where something is rendered that cannot be captured."""
-        if self.catchers:
+        """Raise SceneError where shadow catchers cannot be told from the things on them."""
+        for name, _ in sorted(self.things & (self.flagged | self.makers)):
             raise SceneError(
-                f"'{self.catchers[0]}' is a shadow catcher, which writes no light groups: turn "
-                "Shadow Catcher off (Object properties, Visibility) and capture it as an object"
+                f"'{name}' is in the picture both as a shadow catcher and as a thing, or makes "
+                "instances of one: make the catcher an object of its own"
             )
+
+    def note(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
+        """Note what is rendered as a catcher or as a thing."""
+        one, parent = instance.object, instance.parent
+        if one.is_shadow_catcher:
+            self.catchers.append(one.name)
+            self.flagged.add(_name(one))
+            if parent:
+                self.makers.add(_name(parent))
+        elif parent and parent.is_shadow_catcher:
+            # what is made by a catcher is one
+            self.catchers.append(one.name)
+            self.flagged.add(_name(parent))
+        else:
+            self.things.add(_name(one))
+
+
+def _name(evaluated: bpy.types.Object) -> Name:
+    original = evaluated.original
+    return original.name, original.library.filepath if original.library else ""
 
 
 _found: list[Rendered] = []
@@ -84,11 +112,7 @@ class _BoundsEngine(bpy.types.RenderEngine):
             corners = _local_corners(instance.object)
             if corners is None:
                 continue
-            # what is made of a catcher is one
-            if instance.object.is_shadow_catcher or (
-                instance.parent and instance.parent.is_shadow_catcher
-            ):
-                seen.catchers.append(instance.object.name)
+            seen.note(instance)
             world = np.array([instance.matrix_world @ c for c in corners])
             if np.isfinite(world).all():
                 seen.low = np.minimum(seen.low, world.min(axis=0))

@@ -39,6 +39,7 @@ class Stage:
         self.scene = scene
         self.changed: dict[str, list[Any]] = {}
         self.pace: Pace | None = None  # of the last small render
+        self.own_groups: list[str] = []  # the artist's light groups that have things in them
         self._made: list[bpy.types.ID] = []
 
     def made(self, block: Any) -> Any:
@@ -124,7 +125,9 @@ def stage(scene: bpy.types.Scene, view_layer: str) -> Iterator[Stage]:
                 setattr(layer.cycles, prop.identifier, False)
         while layer.aovs:
             layer.aovs.remove(layer.aovs[0])
-        # the artist's own light groups would only cost memory here
+        # the artist's own light groups are wanted in some renders alone, and cost memory
+        used = {thing.lightgroup for thing in copy.objects}
+        out.own_groups = [g.name for g in layer.lightgroups if g.name in used]
         while layer.lightgroups:
             layer.lightgroups.remove(layer.lightgroups[0])
         copy.render.use_compositing = False

@@ -276,7 +276,10 @@ class ARTO_OT_discard_unfinished(_Quick):
             raise SceneError(f"what is there is of {place.owner}")
         gone = 0
         with Lock(place.folder, "discarding"):
-            for folder in place.folder.glob("unfinished-*"):
+            for folder in [
+                *place.folder.glob("unfinished-*"),
+                *place.folder.glob("*/unfinished-*"),
+            ]:
                 try:
                     shutil.rmtree(folder)
                 except OSError as e:

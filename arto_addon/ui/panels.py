@@ -26,7 +26,7 @@ def _settings(column: bpy.types.UILayout, settings: bpy.types.PropertyGroup, *na
         column.prop(settings, name)
 
 
-class _Panel:
+class Panel:
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "render"
@@ -38,7 +38,7 @@ class _Panel:
         return column
 
 
-class ARTO_PT_main(_Panel, bpy.types.Panel):
+class ARTO_PT_main(Panel, bpy.types.Panel):
     bl_label = "ARTO Relighting"
     bl_idname = "ARTO_PT_main"
 
@@ -93,7 +93,7 @@ class ARTO_PT_main(_Panel, bpy.types.Panel):
             column.label(text=ended.text, icon=icons[ended.level])
 
 
-class ARTO_PT_hemicube(_Panel, bpy.types.Panel):
+class ARTO_PT_hemicube(Panel, bpy.types.Panel):
     bl_label = "Hemicube"
     bl_parent_id = "ARTO_PT_main"
     bl_options = {"DEFAULT_CLOSED"}
@@ -112,7 +112,7 @@ class ARTO_PT_hemicube(_Panel, bpy.types.Panel):
                 sub.prop(settings, name)
 
 
-class ARTO_PT_frames(_Panel, bpy.types.Panel):
+class ARTO_PT_frames(Panel, bpy.types.Panel):
     bl_label = "Frames"
     bl_parent_id = "ARTO_PT_main"
     bl_options = {"DEFAULT_CLOSED"}
@@ -127,7 +127,7 @@ class ARTO_PT_frames(_Panel, bpy.types.Panel):
         column.operator("arto.relight_frames", icon="WORLD")
 
 
-class ARTO_PT_capture(_Panel, bpy.types.Panel):
+class ARTO_PT_capture(Panel, bpy.types.Panel):
     bl_label = "Capture and Files"
     bl_parent_id = "ARTO_PT_main"
     bl_options = {"DEFAULT_CLOSED"}

@@ -7,6 +7,7 @@ import math
 import bpy
 from bpy.props import (
     BoolProperty,
+    CollectionProperty,
     EnumProperty,
     FloatProperty,
     IntProperty,
@@ -50,6 +51,40 @@ def _preset_chosen(self: ArtoSettings, context: bpy.types.Context) -> None:
         if self.preset == "paper":
             # half a side cannot be split in four
             self["adaptive"] = False
+
+
+class ArtoGroup(bpy.types.PropertyGroup):
+    """A part of the world's light that gets a layer of its own. Its name is the layer's."""
+
+    azimuth: FloatProperty(
+        name="Azimuth",
+        description="Where its middle is, counterclockwise from +X as seen from above",
+        subtype="ANGLE",
+        soft_min=-math.pi,
+        soft_max=math.pi,
+    )
+    elevation: FloatProperty(
+        name="Elevation",
+        description="How high its middle is above the horizon",
+        subtype="ANGLE",
+        min=-math.pi / 2,
+        max=math.pi / 2,
+    )
+    radius: FloatProperty(
+        name="Radius",
+        description="How far it reaches from its middle",
+        subtype="ANGLE",
+        min=0.0,
+        max=math.pi,
+        default=math.radians(30),
+    )
+    soft: FloatProperty(
+        name="Soft Edge",
+        description="Over which share of its radius it fades",
+        min=0.0,
+        max=1.0,
+        default=0.1,
+    )
 
 
 class ArtoSettings(bpy.types.PropertyGroup):
@@ -243,6 +278,35 @@ class ArtoSettings(bpy.types.PropertyGroup):
         default="//arto/",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
+    footage: PointerProperty(
+        type=bpy.types.Image,
+        name="Footage",
+        description="What the things are put into where the scene has shadow catchers: an image, "
+        "a sequence or a movie. Empty: what the camera has behind it, or the compositor",
+    )
+    layers: EnumProperty(
+        name="Layers",
+        description="What else is written of the relit picture: the light of each part of the "
+        "world, and of the scene's own lamps, to be mixed in the compositor",
+        items=[
+            ("OFF", "None", "The picture alone"),
+            ("FACES", "By Direction", "A layer for each face of the hemicube"),
+            ("GROUPS", "By Groups", "A layer for each group of the light, and one for the rest"),
+        ],
+        default="OFF",
+    )
+    groups: CollectionProperty(type=ArtoGroup)
+    active_group: IntProperty()
+    layer_prefix: StringProperty(
+        name="Layer Prefix",
+        description="What the layers' names begin with in the file",
+        default="LG_",
+    )
+    layers_half: BoolProperty(
+        name="Half Float",
+        description="Write the layers as 16-bit floats, as compositing does; else as 32-bit",
+        default=True,
+    )
     output: StringProperty(
         name="Relit Picture",
         description="The relit EXR; empty: beside the .blend, named after it",
@@ -262,9 +326,10 @@ CAPTURE = (
 FIT = ("support", "separate")
 RELIGHT = (
     "own_lamps", "lamps", "lamp_samples", "denoise", "environment_width", "look", "output",
+    "layers", "layer_prefix", "layers_half",
 )  # fmt: skip
 
-CLASSES = (ArtoSettings,)
+CLASSES = (ArtoGroup, ArtoSettings)
 
 
 def register() -> None:

@@ -9,8 +9,8 @@ import bpy
 
 from ..job import session
 from ..job.session import Job
-from ..relight import plate
 from ..relight.many import frames_of
+from ..relight.present import present, present_frames
 
 _keys: list[tuple[Any, Any]] = []
 
@@ -25,9 +25,9 @@ def show_relit(job: Job) -> str:
     window = bpy.context.window_manager.windows[0]
     with bpy.context.temp_override(window=window):
         if job.verb == "relight_frames":
-            reveal(plate.present_frames(scene, path, frames_of(scene), job.light))
+            reveal(present_frames(scene, path, frames_of(scene), job.light))
         else:
-            reveal(plate.present(scene, path, job.light))
+            reveal(present(scene, path, job.light))
     return job.state.text
 
 

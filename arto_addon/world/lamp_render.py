@@ -7,7 +7,7 @@ patch, which is why the field is better off without them.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import bpy
@@ -18,9 +18,11 @@ from ...core.environment import Environment
 from ...core.errors import SceneError
 from ...core.field import Field
 from ...core.region import Region
+from ..stage.bounds import rendered
 from ..stage.settings import prepare
 from ..stage.small import parts_of, small
 from ..stage.stage import Stage, free_mark, set_region, stage
+from ..stage.takes import WHOLE, take
 from ..work import Steps
 
 
@@ -98,7 +100,10 @@ def _lit_by(
     scene: bpy.types.Scene, field: Field, shown: Environment
 ) -> Iterator[tuple[Stage, str]]:
     """A stage of a field's picture with a map as its world, and the light group of that."""
-    with stage(scene, field.about["view_layer"]) as on:
+    with ExitStack() as held:
+        on = held.enter_context(stage(scene, field.about["view_layer"]))
+        if field.about.get("catchers"):
+            held.enter_context(take(rendered(on), field.about.get("take", WHOLE)))
         # whatever the artist looks at meanwhile: the field is Cycles'
         on.change("render.engine", "CYCLES")
         prepare(on, layers=0)

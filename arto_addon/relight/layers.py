@@ -1,0 +1,171 @@
+"""Layers of a plate: what each part of the world's light, its lamps and the scene's own give to it.
+
+They are written beside the plate, in one file that compositing programs open, and stand in a node
+group of Blender's compositor with a gain and a tint for each.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core import exr
+from ...core.catcher import Caught
+from ...core.environment import Environment
+from ...core.errors import SceneError
+from ...core.field import Field
+from ...core.layers import REST, by_faces, disc, part_of, residual, share_out, shares
+from ...core.light import PatchLight
+from ...core.relight import TOGETHER, relights
+from ...core.shot import safe_name
+from ..work import Progress, Steps
+from ..world.lamp_render import lamp_light
+from . import denoise
+from .plate import layers_file
+
+if TYPE_CHECKING:
+    from .relight import Ready, Shown
+
+# The layers of no part of the world's light: the scene's own lamps, and the world that is seen.
+OWN, BEHIND = "own", "behind"
+# A part of the light with less than this share of the lamps has none of them.
+LEAST_LAMPS = 1e-4
+# The largest number that a half float holds.
+HALF = 65504.0
+
+
+def _check(groups: Any) -> None:
+    """Raise SceneError where two layers would have one name."""
+    taken = {layer_name(name) for name in (REST, OWN, BEHIND)}
+    for group in groups:
+        name = layer_name(group.name)
+        if name in taken:
+            raise SceneError(f"two layers would be called '{name}': rename the group")
+        taken.add(name)
+
+
+def parts_of(
+    scene: bpy.types.Scene, environment: Environment, field: Field
+) -> dict[str, NDArray[np.float32]]:
+    """The shares (H, W) of an environment that the artist's settings cut it into; they sum to 1."""
+    settings = scene.arto
+    if settings.layers == "FACES":
+        found = by_faces(environment, field.hemicube)
+        # light from where no face is lights nothing: no layer has it
+        return {k: v for k, v in found.items() if v.any()}
+    _check(settings.groups)
+    masks = {
+        group.name: disc(environment, group.azimuth, group.elevation, group.radius, group.soft)
+        for group in settings.groups
+    }
+    if not masks:
+        return {"light": np.ones(environment.image.shape[:2], np.float32)}
+    return shares(masks)
+
+
+def pictures_of(
+    field: Field, environment: Environment, parts: dict[str, NDArray[np.float32]], cut: bool
+) -> dict[str, NDArray[np.float32]]:
+    """What each part of an environment gives to a field's picture, (H, W, 3), by its name."""
+    out: dict[str, NDArray[np.float32]] = {}
+    names = list(parts)
+    for first in range(0, len(names), TOGETHER):
+        some = names[first : first + TOGETHER]
+        lights = [PatchLight(part_of(environment, parts[n]), field.hemicube) for n in some]
+        found = relights(field, lights, 0.0, cut=cut)
+        out |= {name: picture[..., :3] for name, picture in zip(some, found, strict=True)}
+    return out
+
+
+def lamp_shares(lamps: Environment, parts: dict[str, NDArray[np.float32]]) -> dict[str, float]:
+    """How much of the lamps' light each part has, of those that have some."""
+    weights = lamps.image.sum(axis=-1, dtype=np.float64) * lamps.row_solid_angles[:, None]
+    total = float(weights.sum())
+    found = {name: float((weights * share).sum()) / total for name, share in parts.items()}
+    return {name: share for name, share in found.items() if share > LEAST_LAMPS}
+
+
+def of_plate(shown: Shown, ready: Ready, caught: Caught | None) -> Steps:
+    """The layers of a plate, (H, W, 3) each, by name, denoised where the plate is.
+
+    caught: of a shot with shadow catchers, whose things alone are in layers.
+    """
+    parts = parts_of(shown.scene, ready.whole, shown.field)
+    found = yield from _of_take(shown, ready, ready.parts, parts, caught is not None)
+    if caught and shown.ground:
+        beside = yield from _of_take(shown.ground, ready, ready.ground_parts, parts, True)
+        found = {name: caught.colour_of(found[name], beside[name]) for name in found}
+    return found
+
+
+def _of_take(
+    shown: Shown,
+    ready: Ready,
+    rendered: list[NDArray[np.float32]],
+    parts: dict[str, NDArray[np.float32]],
+    cut: bool,
+) -> Steps:
+    scene, field = shown.scene, shown.field
+    yield Progress(0.9, f"relighting {len(parts)} layers")
+    rest = ready.found.rest if rendered else ready.whole
+    found = pictures_of(field, rest, parts, cut)
+    for lamps in rendered:
+        some = lamp_shares(ready.found.lamps, parts)
+        for name, share in some.items():
+            light = lamps
+            if len(some) > 1:
+                mine = part_of(ready.found.lamps, parts[name])
+                samples = max(4, round(share * scene.arto.lamp_samples))
+                light = yield from lamp_light(scene, field, mine, samples, 0.9)
+            found[name] = found[name] + light
+    if scene.arto.own_lamps and shown.own.any():
+        left, scale = shown.own, np.float32(scene.arto.own_lamps)
+        for name in field.own_layers:
+            found[name] = scale * field.layer(name)
+            left = left - field.layer(name)
+        # of no group; what is left of sums by rounding is nothing
+        found[OWN] = scale * np.where(left > 1e-5 * shown.own, left, 0)
+    if scene.arto.denoise and denoise.available():
+        clean = denoise.clean(field)
+        for name, picture in found.items():
+            yield Progress(0.93, f"denoising the layer {name}")
+            found[name] = denoise.denoise(shown.guides, picture, clean=clean, like=scene)
+    return found
+
+
+def write(
+    scene: bpy.types.Scene,
+    path: Path,
+    beauty: NDArray[np.float32],
+    layers: dict[str, NDArray[np.float32]],
+    attributes: dict[str, Any],
+    space: str,
+) -> Steps:
+    """Write layers that sum to a plate (H, W, 4), and it; says how far their sum is off."""
+    settings = scene.arto
+    names = list(layers)
+    parts = share_out(list(layers.values()), beauty[..., :3])
+    kind = np.float32
+    if settings.layers_half:
+        if max(float(np.max(p, initial=0)) for p in [*parts, beauty]) <= HALF:
+            kind = np.float16
+        else:
+            yield Progress(0.95, "the layers are written as 32-bit: light past what half holds")
+    stored = [part.astype(kind) for part in parts]
+    picture = beauty.astype(kind)
+    off = residual(stored, picture[..., :3].astype(np.float64))
+    named = {
+        f"{settings.layer_prefix}{layer_name(n)}": p for n, p in zip(names, stored, strict=True)
+    }
+    exr.write_layered(layers_file(path), picture, named, attributes, space)
+    yield Progress(0.95, f"layers: {', '.join(named)}; their sum is off by {off:.1e} at most")
+
+
+def layer_name(name: str) -> str:
+    """A name for channels: no dot, which parts layers, no blank, and never a number alone."""
+    out = safe_name(name).replace(".", "_").replace(" ", "_")
+    return f"layer_{out}" if out.isdigit() else out

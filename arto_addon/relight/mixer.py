@@ -1,0 +1,83 @@
+"""The mixer: a compositor node group that adds up a plate's layers, each with a gain and a tint.
+
+Made once and then kept: what the artist set in it, or changed of it, stays. It needs no ARTO to
+work, only the file of the layers.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...core import exr
+from .plate import add_footage, mixed, show
+
+SOURCE, ALPHA, EXPOSURE = "ARTO Layers", "ARTO Alpha", "ARTO Exposure"
+_BLACK, _WHITE = (0.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0, 1.0)
+
+
+def mixer(path: Path, name: str, share: bpy.types.Image | None = None) -> Any:
+    """The node group of that name for the layers in a file.
+
+    share: of a plate with shadow catchers, see `plate.node_group`.
+    """
+    image = show(path, name)
+    tree = bpy.data.node_groups.get(name)
+    if tree is None or tree.bl_idname != "CompositorNodeTree":
+        tree = _new(name)
+    source = tree.nodes.get(SOURCE)
+    if source is None:
+        return tree  # the artist's own by now
+    source.image = image
+    there = {socket.name for socket in tree.interface.items_tree if socket.in_out == "INPUT"}
+    for layer in (n for n in exr.part_names(path) if n):
+        if layer not in there and EXPOSURE in tree.nodes:
+            _add(tree, source, layer)
+    if share:
+        add_footage(tree, tree.nodes[ALPHA].outputs[0], share)
+    return tree
+
+
+def _new(name: str) -> Any:
+    tree = bpy.data.node_groups.new(name, "CompositorNodeTree")
+    tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+    tree.interface.new_socket("Alpha", in_out="OUTPUT", socket_type="NodeSocketFloat")
+    tree.interface.new_socket("Exposure", in_out="INPUT", socket_type="NodeSocketFloat")
+    source = tree.nodes.new("CompositorNodeImage")
+    source.name, source.location = SOURCE, (-400, 0)
+    entry, out = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+    entry.location, out.location = (-400, -500), (1000, 0)
+    exposure = tree.nodes.new("CompositorNodeExposure")
+    exposure.name, exposure.location = EXPOSURE, (600, 0)
+    exposure.inputs["Image"].default_value = _BLACK
+    alpha = tree.nodes.new("CompositorNodeSetAlpha")
+    alpha.name, alpha.location = ALPHA, (800, 0)
+    alpha.inputs["Type"].default_value = "Replace Alpha"
+    link = tree.links.new
+    link(entry.outputs["Exposure"], exposure.inputs["Exposure"])
+    link(exposure.outputs[0], alpha.inputs["Image"])
+    link(alpha.outputs[0], out.inputs["Image"])
+    return tree
+
+
+def _add(tree: Any, source: Any, layer: str) -> None:
+    """Add a layer to the sum, with its sockets: its gain by its name, and its tint."""
+    gain = tree.interface.new_socket(layer, in_out="INPUT", socket_type="NodeSocketFloat")
+    gain.default_value, gain.min_value = 1.0, 0.0
+    gain.description = "How much of this layer's light is seen"
+    tint = tree.interface.new_socket(f"{layer} Tint", in_out="INPUT", socket_type="NodeSocketColor")
+    tint.default_value = _WHITE
+    entry = next(n for n in tree.nodes if n.bl_idname == "NodeGroupInput")
+    light = mixed(tree, "MULTIPLY", source.outputs[layer], entry.outputs[f"{layer} Tint"])
+    light = mixed(tree, "MULTIPLY", light, entry.outputs[layer])
+    into = tree.nodes[EXPOSURE].inputs["Image"]
+    if into.is_linked:
+        light = mixed(tree, "ADD", into.links[0].from_socket, light)
+    else:
+        alpha = source.outputs["Alpha"]
+        tree.links.new(alpha, tree.nodes[ALPHA].inputs["Alpha"])
+        out = next(n for n in tree.nodes if n.bl_idname == "NodeGroupOutput")
+        tree.links.new(alpha, out.inputs["Alpha"])
+    tree.links.new(light, into)

@@ -1,0 +1,91 @@
+"""Showing a plate in the scene's compositor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...core import exr
+from .mixer import mixer
+from .plate import CATCHER, LAYERS, SOURCE, layers_file, name_of, node_group, share_file, show
+
+
+def present(scene: bpy.types.Scene, path: Path, look: str | None = None) -> bpy.types.Image:
+    """Show a plate that was written: its image, and its node in the scene's compositor.
+
+    look: that it was made for (default: the scene's now). In the window that is one step that can
+    be undone.
+    """
+    name = name_of(scene, look)
+    image, header = show(path, name), exr.header(path)
+    share = show(share_file(path), f"{name} Catcher") if CATCHER in header else None
+    if LAYERS in header:
+        wire(scene, mixer(layers_file(path), f"{name} Mix", share))
+    if wire(scene, node_group(image, name, share)) is None:
+        tree = scene.compositing_node_group.name
+        print(f"ARTO: the compositor '{tree}' is linked and stays as it is: add '{name}' to it")
+    if not bpy.app.background and bpy.context.window_manager.windows:
+        bpy.ops.ed.undo_push(message="Relight")
+    return image
+
+
+def present_frames(
+    scene: bpy.types.Scene, first: Path, frames: Sequence[int], look: str | None = None
+) -> bpy.types.Image:
+    """Show plates of frames, numbered as `many` numbers them, as a sequence: an image and its node,
+    which at each frame of the scene show that frame's.
+
+    first: the first frame's file. They stand beside the plate of a single frame.
+    """
+    name = f"{name_of(scene, look)} Frames"
+    image = show(first, name)
+    image.source = "SEQUENCE"
+    group = node_group(image, name)
+    if source := group.nodes.get(SOURCE):
+        source.frame_duration = frames[-1] - frames[0] + 1
+        source.frame_start = frames[0]
+        # a sequence counts its files from 1
+        source.frame_offset = frames[0] - 1
+        source.use_auto_refresh = True
+    wire(scene, group)
+    return image
+
+
+def wire(scene: bpy.types.Scene, group: Any) -> Any:
+    """Put the node group into the scene's compositor, seen through the viewer; return its node.
+
+    What the compositor puts out stays what it was: an artist's tree gains the node, and a viewer
+    if it had none; a scene without a compositor gets one that passes its render on. A tree linked
+    from a library is left alone (-> None): the plate's node group can be added where it is made.
+    """
+    tree = scene.compositing_node_group
+    if tree is None:
+        tree = bpy.data.node_groups.new("ARTO Compositor", "CompositorNodeTree")
+        tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+        render = tree.nodes.new("CompositorNodeRLayers")
+        render.scene = scene
+        out = tree.nodes.new("NodeGroupOutput")
+        out.location = (500, 0)
+        tree.links.new(render.outputs["Image"], out.inputs["Image"])
+        scene.compositing_node_group = tree
+    if not tree.is_editable:
+        return None  # a library's: an edit of it would be gone with the next save
+    node = next(
+        (n for n in tree.nodes if n.bl_idname == "CompositorNodeGroup" and n.node_tree == group),
+        None,
+    )
+    if node is None:
+        below = min((n.location.y - max(n.height, 200) for n in tree.nodes), default=0.0)
+        node = tree.nodes.new("CompositorNodeGroup")
+        node.node_tree = group
+        node.label = group.name
+        node.width = 200
+        node.location = (0, below - 40)
+        if not any(n.bl_idname == "CompositorNodeViewer" for n in tree.nodes):
+            viewer = tree.nodes.new("CompositorNodeViewer")
+            viewer.location = (node.location.x + 500, node.location.y)
+            tree.links.new(node.outputs["Image"], viewer.inputs["Image"])
+    return node

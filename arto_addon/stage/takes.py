@@ -1,0 +1,76 @@
+"""Takes: a shot with shadow catchers is captured twice, and once more for its outlines.
+
+Cycles gives shadow catchers no light groups. So what is on the ground is told from the ground by
+two pictures of the same light: everything as ordinary things, and the catchers alone. What the
+things cover is a third, quick one. See `core.catcher`.
+
+Flags of objects say what is in a take. They are the artist's objects, which the stage shares: they
+are put back on every way out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import bpy
+
+from ...core.errors import SceneError
+from .bounds import Name, Rendered
+
+# The names of takes: of everything, which is the only one where nothing catches shadows; of the
+# catchers alone; of what the things cover.
+WHOLE, GROUND, MATTE = "", "ground", "matte"
+# What rays an object is seen by.
+_RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
+
+
+@contextmanager
+def take(seen: Rendered, name: str) -> Iterator[None]:
+    """The objects as a take of what is rendered has them. Raises SceneError."""
+    if not seen.catchers:
+        if name != WHOLE:
+            raise ValueError(f"a scene without shadow catchers has no take '{name}'")
+        yield
+        return
+    seen.check()
+    wanted: list[tuple[Any, str, bool]] = []
+    for thing in _originals(seen.flagged):
+        _check_still(thing)
+        wanted.append((thing, "is_shadow_catcher", False))
+        if name == MATTE:
+            wanted.append((thing, "is_holdout", True))
+    if name == GROUND:
+        for thing in _originals(seen.things):
+            wanted += [(thing, f"visible_{ray}", False) for ray in _RAYS]
+    were = [(thing, flag, getattr(thing, flag)) for thing, flag, _ in wanted]
+    try:
+        for thing, flag, value in wanted:
+            setattr(thing, flag, value)
+        yield
+    finally:
+        for thing, flag, value in were:
+            setattr(thing, flag, value)
+
+
+def _originals(names: Iterable[Name]) -> list[bpy.types.Object]:
+    return [bpy.data.objects[name, library or None] for name, library in sorted(names)]
+
+
+def _check_still(thing: bpy.types.Object) -> None:
+    """Raise SceneError where a catcher's flags are animated: the render would set them anew."""
+    animation = thing.animation_data
+    if animation is None:
+        return
+    paths = [d.data_path for d in animation.drivers]
+    if animation.action:
+        for layer in animation.action.layers:
+            for strip in layer.strips:
+                paths += [c.data_path for bag in strip.channelbags for c in bag.fcurves]
+    for path in paths:
+        if path in {"is_shadow_catcher", "is_holdout"} or path.startswith("visible_"):
+            raise SceneError(
+                f"'{thing.name}' is a shadow catcher whose {path} is animated: remove that "
+                "animation to capture it"
+            )

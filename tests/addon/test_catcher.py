@@ -1,0 +1,321 @@
+"""Shadow catchers: what Cycles makes of them is the truth."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from arto.arto_addon import fit, work
+from arto.arto_addon.blender.output import float_exr
+from arto.arto_addon.capture import capture
+from arto.arto_addon.relight import plate, relight
+from arto.arto_addon.shot import paths
+from arto.arto_addon.stage.stage import stage
+from arto.core import exr
+from arto.core.errors import CancelledError, FieldError, SceneError
+from arto.core.field import Field
+from scene_tools import BOX, add_mesh, captured, differences, set_colour, small_scene, snapshot
+from test_checks import instance_of
+from test_world import hdri, smooth
+
+
+def with_catcher(tmp_path, samples=256, patches=4):
+    scene = small_scene(tmp_path)
+    scene.objects["Floor"].is_shadow_catcher = True
+    scene.render.film_transparent = True
+    scene.arto.samples, scene.arto.patches, scene.arto.keep = samples, patches, "never"
+    hdri(scene, smooth())
+    return scene
+
+
+def relit(scene) -> tuple[np.ndarray, np.ndarray]:
+    """The plate (H, W, 4), and how much is seen of what is behind it (H, W, 3)."""
+    path, _ = work.run(relight.relight(scene))
+    return exr.read(path)[""], exr.read(plate.share_file(path))[""]
+
+
+def cycles_catcher(scene, samples, seed, tmp_path, share=True) -> np.ndarray:
+    """What Cycles renders with its own catcher -> (H, W, 3), its Shadow Catcher pass; or else
+    (H, W, 4), its plate, which has the shadows where there is no such pass."""
+    with stage(scene, scene.view_layers[0].name) as on:
+        float_exr(on.scene.render)
+        on.scene.view_layers[0].cycles.use_pass_shadow_catcher = share
+        cycles = on.scene.cycles
+        cycles.samples, cycles.seed, cycles.sample_clamp_indirect = samples, seed, 0
+        cycles.use_adaptive_sampling = cycles.use_denoising = False
+        on.scene.render.filepath = str(tmp_path / "catcher.exr")
+        request = work.Render(on.scene.name, 0, "")
+        work.blocking_render(request)
+        request.check()
+    wanted = "Shadow Catcher" if share else "Combined"
+    (found,) = (p for n, p in exr.read(tmp_path / "catcher.exr").items() if n.endswith(wanted))
+    return found[..., :3] if share else found
+
+
+def bare_of(scene) -> np.ndarray:
+    """Where nothing stands before the ground."""
+    return Field(paths.field_folder(scene).parent / "ground" / "field").layer("things") == 0
+
+
+def test_as_cycles_own_catcher(tmp_path):
+    """Under a coloured sky: the light on the things, their outlines, the share of the footage in
+    their shadows, each to within what two of Cycles' own renders differ by and a little."""
+    scene = with_catcher(tmp_path, samples=512)
+    captured(scene)
+    picture, share = relit(scene)
+    first, second = (cycles_catcher(scene, 512, s, tmp_path) for s in (1, 2))
+    one, two = (cycles_catcher(scene, 512, s, tmp_path, share=False) for s in (1, 2))
+    bare = bare_of(scene)
+    assert 0.3 < bare.mean() < 0.9
+    noise = np.abs(first - second)[bare].mean()
+    assert np.abs(share - first)[bare].mean() < 2 * noise + 0.01
+    assert abs(share[bare].mean() - first[bare].mean()) < 0.01
+    assert first[bare].min() < 0.7  # there is a shadow at all
+    floor = np.abs(one - two)[..., :3].mean()
+    assert np.abs(picture - one)[..., :3].mean() < 2 * floor + 0.003
+    np.testing.assert_allclose(picture[..., 3], one[..., 3], atol=0.1)
+    assert np.abs(picture - one)[..., 3].mean() < 0.015
+
+
+def test_without_things_the_footage_passes(tmp_path):
+    scene = with_catcher(tmp_path, samples=16, patches=1)
+    for name in ("Matt", "Glossy"):
+        scene.objects[name].hide_render = True
+    captured(scene)
+    picture, share = relit(scene)
+    np.testing.assert_allclose(share, 1, atol=1e-4)
+    np.testing.assert_allclose(picture, 0, atol=1e-4)
+
+
+def test_the_artists_flags_are_put_back(tmp_path, monkeypatch):
+    scene = with_catcher(tmp_path, samples=4, patches=1)
+    scene.objects["Glossy"].visible_glossy = False
+    before = snapshot()
+    captured(scene)
+    assert not differences(before, snapshot())
+
+    def interrupt(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(work, "blocking_render", interrupt)
+    scene.arto.samples = 5
+    before = snapshot()
+    with pytest.raises(CancelledError):
+        captured(scene)
+    assert not differences(before, snapshot())
+
+
+@pytest.mark.parametrize("how", ["instance", "library", "nodes"])
+def test_however_a_catcher_comes_into_the_scene(tmp_path, how):
+    """In an instance of an instance, in a linked file, made by geometry nodes: one share of all."""
+    scene = with_catcher(tmp_path, samples=16, patches=1)
+    captured(scene)
+    _, expected = relit(scene)
+    floor = scene.objects["Floor"]
+    kept, outer = bpy.data.collections.new("Kept"), bpy.data.collections.new("Outer")
+    scene.collection.objects.unlink(floor)
+    kept.objects.link(floor)
+    if how == "instance":
+        instance_of(kept, outer)
+        instance_of(outer, scene.collection)
+    elif how == "library":
+        file = tmp_path / "library.blend"
+        bpy.data.libraries.write(str(file), {kept})
+        bpy.data.batch_remove([kept, floor])
+        with bpy.data.libraries.load(str(file), link=True) as (_, to):
+            to.collections = ["Kept"]
+        scene.collection.children.link(to.collections[0])
+    else:
+        tree = bpy.data.node_groups.new("Made", "GeometryNodeTree")
+        tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+        info = tree.nodes.new("GeometryNodeObjectInfo")
+        info.inputs["Object"].default_value = floor
+        info.inputs["As Instance"].default_value = True
+        out = tree.nodes.new("NodeGroupOutput")
+        tree.links.new(info.outputs["Geometry"], out.inputs[0])
+        maker = add_mesh(scene, "Maker", [], [])
+        maker.modifiers.new("Made", "NODES").node_group = tree
+    captured(scene)
+    _, share = relit(scene)
+    np.testing.assert_allclose(share, expected, atol=0.02)
+
+
+def test_what_makes_a_catcher_must_not_be_a_thing(tmp_path):
+    scene = with_catcher(tmp_path, samples=4, patches=1)
+    scene.objects["Floor"].parent = scene.objects["Matt"]
+    scene.objects["Matt"].instance_type = "VERTS"
+    scene.objects["Matt"].show_instancer_for_render = True
+    with pytest.raises(SceneError, match="an object of its own"):
+        captured(scene)
+
+
+def test_an_animated_flag_is_refused(tmp_path):
+    scene = with_catcher(tmp_path, samples=4, patches=1)
+    scene.objects["Floor"].keyframe_insert("is_shadow_catcher", frame=1)
+    with pytest.raises(SceneError, match="animated"):
+        captured(scene)
+
+
+def test_stopped_between_takes_it_goes_on(tmp_path, monkeypatch):
+    """What was rendered is not rendered again, whichever take was the last."""
+    scene = with_catcher(tmp_path, samples=4, patches=1)
+    renders = []
+
+    def run(most):
+        count = 0
+        steps = capture.capture(scene, scene.view_layers[0].name)
+        for step in steps:
+            if isinstance(step, work.Render):
+                long = "basis images" in step.text or "outlines" in step.text
+                count += long
+                if count > most:
+                    steps.close()
+                    return
+                if long:
+                    renders.append(step.text)
+                work.blocking_render(step)
+
+    for _ in range(3):
+        run(1)
+        with pytest.raises(FieldError):
+            Field(paths.field_folder(scene))
+    run(0)
+    assert len(renders) == 3 and len({t for t in renders if "outlines" in t}) == 1
+    picture, share = relit(scene)
+    assert picture.shape[:2] == share.shape[:2]
+
+
+def test_kept_images_fit_to_the_same(tmp_path):
+    scene = with_catcher(tmp_path, samples=8, patches=1)
+    captured(scene)
+    expected = relit(scene)
+    scene.arto.keep = "always"
+    captured(scene)
+    work.run(fit.fit(scene))
+    for one, two in zip(relit(scene), expected, strict=True):
+        np.testing.assert_allclose(one, two, atol=1e-6)
+
+
+def test_takes_of_two_captures_are_not_mixed(tmp_path):
+    scene = with_catcher(tmp_path, samples=4, patches=1)
+    captured(scene)
+    beside = paths.field_folder(scene).parent / "ground"
+    beside.rename(tmp_path / "old")
+    scene.arto.samples = 5
+    captured(scene)
+    for part in beside.iterdir():
+        part.rename(tmp_path / f"new_{part.name}")
+    beside.rmdir()
+    (tmp_path / "old").rename(beside)
+    with pytest.raises(FieldError, match="run Capture again"):
+        relit(scene)
+
+
+def test_lamps_of_the_world_fall_on_both(tmp_path):
+    """A sun in the map, rendered by itself, throws its shadow onto the ground."""
+    scene = with_catcher(tmp_path, samples=128)
+    image = smooth()
+    image[10:13, 40:43] += 400.0
+    hdri(scene, image)
+    scene.arto.lamps, scene.arto.lamp_samples = True, 256
+    captured(scene)
+    _, share = relit(scene)
+    first, second = (cycles_catcher(scene, 512, s, tmp_path) for s in (1, 2))
+    bare = bare_of(scene)
+    noise = np.abs(first - second)[bare].mean()
+    assert np.abs(share - first)[bare].mean() < 2 * noise + 0.02
+
+
+def footage_of(scene, tmp_path, colour=(0.25, 0.5, 0.75)):
+    """An 8-bit picture behind the camera, of the picture's size."""
+    image = bpy.data.images.new("Filmed", 24, 18)
+    image.pixels.foreach_set(np.tile(np.float32([*colour, 1]), 24 * 18))
+    image.filepath_raw, image.file_format = str(tmp_path / "filmed.png"), "PNG"
+    image.save()
+    image = bpy.data.images.load(str(tmp_path / "filmed.png"))
+    camera = scene.camera.data
+    camera.show_background_images = True
+    camera.background_images.new().image = image
+    return image
+
+
+def test_footage_is_put_behind_in_its_colour_space(tmp_path):
+    """An sRGB picture is brought to scene-linear; where no shadow falls, it is what was filmed."""
+    scene = with_catcher(tmp_path, samples=8, patches=1)
+    image = footage_of(scene, tmp_path)
+    captured(scene)
+    picture, share = relit(scene)
+    comp = exr.read(plate.comp_file(paths.relit_file(scene)))[""]
+    encoded = np.array([64, 128, 191]) / 255
+    linear = ((encoded + 0.055) / 1.055) ** 2.4
+    np.testing.assert_allclose(comp, picture[..., :3] + share * linear, atol=2e-3)
+    image.filepath = str(tmp_path / "gone.png")
+    with pytest.raises(SceneError, match="find it"):
+        relit(scene)
+
+
+def test_the_setting_goes_before_the_camera_and_a_moved_background_is_said(tmp_path):
+    scene = with_catcher(tmp_path, samples=4, patches=1)
+    footage_of(scene, tmp_path)
+    captured(scene)
+    scene.camera.data.background_images[0].scale = 2.0
+    with pytest.raises(SceneError, match="scaled"):
+        relit(scene)
+    grey = bpy.data.images.new("Grey", 48, 36, float_buffer=True)
+    grey.pixels.foreach_set(np.full(48 * 36 * 4, 0.5, np.float32))
+    grey.colorspace_settings.name = bpy.data.colorspace.working_space
+    scene.arto.footage = grey
+    picture, share = relit(scene)
+    comp = exr.read(plate.comp_file(paths.relit_file(scene)))[""]
+    np.testing.assert_allclose(comp, picture[..., :3] + 0.5 * share, atol=1e-5)
+
+
+def test_the_group_puts_footage_behind(tmp_path):
+    """The plate's node group, in Blender's compositor, gives what the core's arithmetic gives."""
+    scene = with_catcher(tmp_path, samples=8, patches=1)
+    captured(scene)
+    picture, share = relit(scene)
+    group = bpy.data.node_groups["ARTO Relit"]
+    tree = bpy.data.node_groups.new("Comp", "CompositorNodeTree")
+    tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+    node, out = tree.nodes.new("CompositorNodeGroup"), tree.nodes.new("NodeGroupOutput")
+    node.node_tree = group
+    node.inputs["Footage"].default_value = (0.2, 0.4, 0.6, 1)
+    tree.links.new(node.outputs["Composite"], out.inputs[0])
+    scene.compositing_node_group = tree
+    scene.render.use_compositing = True
+    scene.cycles.samples = 1
+    float_exr(scene.render, multilayer=False)
+    scene.render.filepath = str(tmp_path / "group.exr")
+    bpy.ops.render.render(write_still=True)
+    found = next(iter(exr.read(tmp_path / "group.exr").values()))[..., :3]
+    np.testing.assert_allclose(found, picture[..., :3] + share * (0.2, 0.4, 0.6), atol=1e-4)
+
+
+def test_opaque_film_shows_the_world_in_shadow(tmp_path):
+    """As Cycles has it: the world behind, darkened by the grey of the shadow."""
+    scene = with_catcher(tmp_path, samples=128)
+    set_colour(scene, (1, 1, 1))
+    scene.render.film_transparent = False
+    captured(scene)
+    picture, _ = relit(scene)
+    one, two = (cycles_catcher(scene, 512, s, tmp_path, share=False) for s in (1, 2))
+    assert (picture[..., 3] == 1).all()
+    noise = np.abs(one - two)[..., :3].mean()
+    assert np.abs(picture - one)[..., :3].mean() < 2 * noise + 0.02
+
+
+def test_names_of_shapes(tmp_path):
+    """A box that throws no shadow is no shadow of it: the flags that the artist set stay."""
+    scene = with_catcher(tmp_path, samples=64, patches=1)
+    box = add_mesh(scene, "Quiet", *BOX)
+    box.location, box.scale = (0, -3, 2), (0.5, 0.5, 0.5)
+    for name in ("Matt", "Glossy"):
+        scene.objects[name].hide_render = True
+    box.visible_diffuse = box.visible_shadow = box.visible_camera = False
+    box.visible_glossy = box.visible_transmission = False
+    captured(scene)
+    _, share = relit(scene)
+    np.testing.assert_allclose(share, 1, atol=0.05)

@@ -1,0 +1,222 @@
+"""Layers of a plate: they sum to it, in its file and in Blender's compositor."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+import OpenEXR
+import pytest
+from arto.arto_addon import work
+from arto.arto_addon.blender.output import float_exr
+from arto.arto_addon.relight import plate, relight
+from arto.arto_addon.shot import paths
+from arto.core import exr
+from arto.core.errors import SceneError
+from arto.core.field import Field
+from scene_tools import captured, small_scene
+from test_world import hdri, smooth
+
+
+@pytest.fixture
+def lit(tmp_path):
+    scene = small_scene(tmp_path, lamp=True)
+    scene.render.film_transparent = True
+    scene.arto.samples, scene.arto.patches, scene.arto.keep = 32, 2, "never"
+    scene.arto.layers, scene.arto.layers_half = "FACES", False
+    hdri(scene, smooth())
+    captured(scene)
+    return scene
+
+
+def relit(scene):
+    """The plate, and its layers by name."""
+    path, _ = work.run(relight.relight(scene))
+    found = exr.read(plate.layers_file(path))
+    np.testing.assert_array_equal(found.pop(""), exr.read(path)[""])
+    return exr.read(path)[""], found
+
+
+def group_at(scene, name, azimuth, elevation, radius):
+    group = scene.arto.groups.add()
+    group.name, group.azimuth, group.elevation = name, azimuth, elevation
+    group.radius = radius
+    return group
+
+
+def test_faces_and_the_scenes_own_lamps_sum_to_the_plate(lit):
+    picture, found = relit(lit)
+    assert set(found) == {
+        f"LG_{f}" for f in ("top", "bottom", "left", "right", "back", "front")
+    } | {"LG_own"}
+    np.testing.assert_allclose(sum(found.values()), picture[..., :3], rtol=1e-5, atol=1e-6)
+    assert all((layer >= 0).all() for layer in found.values())
+    # a box lit from the left is brighter on its left: the layers are what they say
+    assert found["LG_own"].any() and found["LG_top"].mean() > found["LG_bottom"].mean()
+
+
+def test_a_layer_is_the_picture_in_that_part_of_the_light(lit):
+    """The layer of a group is what the plate is under a world of nothing but that group."""
+    lit.arto.layers = "GROUPS"
+    group_at(lit, "key", 2.0, 0.6, 0.8)
+    lit.arto.own_lamps = 0.0
+    _, found = relit(lit)
+    image = smooth()
+    height, width = image.shape[:2]
+    u, v = (np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height
+    azimuth, latitude = (0.5 - u) * 2 * np.pi, (0.5 - v) * np.pi
+    across = np.cos(latitude)[:, None]
+    towards = np.dstack([across * np.cos(azimuth), across * np.sin(azimuth),
+                         np.broadcast_to(np.sin(latitude)[:, None], (height, width))])  # fmt: skip
+    middle = (math.cos(0.6) * math.cos(2.0), math.cos(0.6) * math.sin(2.0), math.sin(0.6))
+    angle = np.arccos(np.clip(towards @ np.array(middle), -1, 1))
+    mask = np.clip((0.8 - angle) / 0.08 + 0.5, 0, 1)
+    hdri(lit, image * mask[..., None])
+    lit.arto.layers = "OFF"
+    path, _ = work.run(relight.relight(lit))
+    alone = exr.read(path)[""][..., :3]
+    # the map of the world and its mask are of other resolutions
+    assert np.abs(found["LG_key"] - alone).mean() < 0.03 * alone.mean()
+
+
+def test_groups_need_names_of_their_own(lit):
+    lit.arto.layers = "GROUPS"
+    group_at(lit, "key.1", 0, 0.5, 0.3)
+    group_at(lit, "key_1", 1, 0.5, 0.3)
+    with pytest.raises(SceneError, match="rename"):
+        relit(lit)
+    lit.arto.groups[1].name = "rest"
+    with pytest.raises(SceneError, match="rename"):
+        relit(lit)
+    lit.arto.groups[1].name = "12"
+    _, found = relit(lit)
+    assert "LG_layer_12" in found and not any(n.removeprefix("LG_").isdigit() for n in found)
+
+
+def test_denoised_layers_sum_to_the_denoised_plate(lit):
+    lit.arto.denoise = True
+    picture, found = relit(lit)
+    np.testing.assert_allclose(sum(found.values()), picture[..., :3], rtol=1e-5, atol=1e-6)
+
+
+def test_a_sun_is_in_the_group_that_has_it(lit):
+    """Its light, rendered by itself, is in that layer alone, and the sum is the plate."""
+    image = smooth()
+    image[10:13, 40:43] += 400.0
+    hdri(lit, image)
+    lit.arto.lamps, lit.arto.lamp_samples, lit.arto.own_lamps = True, 64, 0.0
+    lit.arto.layers = "GROUPS"
+    u, v = 41.5 / image.shape[1], 11.5 / image.shape[0]
+    group_at(lit, "sun", (0.5 - u) * 2 * math.pi, (0.5 - v) * math.pi, 0.3)
+    picture, found = relit(lit)
+    np.testing.assert_allclose(sum(found.values()), picture[..., :3], rtol=1e-5, atol=1e-6)
+    assert found["LG_sun"].mean() > 0.5 * picture[..., :3].mean()
+
+
+def test_the_world_behind_is_a_layer(lit):
+    lit.render.film_transparent = False
+    picture, found = relit(lit)
+    np.testing.assert_allclose(sum(found.values()), picture[..., :3], rtol=1e-5, atol=1e-6)
+    clear = found["LG_behind"].sum(axis=-1) > 0
+    assert 0.05 < clear.mean() < 0.95
+
+
+def test_half_floats_and_header(lit):
+    """As compositing programs want them; read by a reader that knows nothing of ARTO."""
+    lit.arto.layers_half, lit.arto.layer_prefix = True, "C_"
+    relit_path, _ = work.run(relight.relight(lit))
+    file = OpenEXR.File(str(plate.layers_file(relit_path)), separate_channels=True)
+    (part,) = file.parts
+    assert part.header["colorInteropID"] == "lin_rec709_scene"
+    assert "chromaticities" not in part.header
+    names = list(part.channels)
+    assert {"R", "G", "B", "A", "C_top.R", "C_own.B"} <= set(names)
+    assert all(c.pixels.dtype == np.float16 for c in part.channels.values())
+    for c in "RGB":
+        layers = [part.channels[n].pixels.astype(float) for n in names if n.endswith(f".{c}")]
+        whole = part.channels[c].pixels.astype(float)
+        assert np.abs(sum(layers) - whole).max() < 2e-3 * whole.max()
+
+
+def test_the_mixer_in_the_compositor(lit, tmp_path):
+    """With every gain at one it gives the plate; a gain dims its layer alone, a tint colours it."""
+    picture, found = relit(lit)
+    group = bpy.data.node_groups["ARTO Relit Mix"]
+    tree = bpy.data.node_groups.new("Comp", "CompositorNodeTree")
+    tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+    node, out = tree.nodes.new("CompositorNodeGroup"), tree.nodes.new("NodeGroupOutput")
+    node.node_tree = group
+    tree.links.new(node.outputs["Image"], out.inputs[0])
+    lit.compositing_node_group = tree
+    lit.render.use_compositing, lit.cycles.samples = True, 1
+    float_exr(lit.render, multilayer=False)
+
+    def composited():
+        lit.render.filepath = str(tmp_path / "mix.exr")
+        bpy.ops.render.render(write_still=True)
+        return next(iter(exr.read(tmp_path / "mix.exr").values()))
+
+    np.testing.assert_allclose(composited(), picture, rtol=1e-4, atol=1e-5)
+    node.inputs["LG_top"].default_value = 0.25
+    node.inputs["LG_own Tint"].default_value = (1, 0, 0, 1)
+    node.inputs["Exposure"].default_value = 1.0
+    mixed = sum(found.values()) - 0.75 * found["LG_top"] - found["LG_own"] * (0, 1, 1)
+    np.testing.assert_allclose(composited()[..., :3], 2 * mixed, rtol=1e-4, atol=1e-5)
+    # kept: another relight puts new pixels into the same nodes and sockets
+    nodes = len(group.nodes)
+    relit(lit)
+    assert len(group.nodes) == nodes and node.inputs["LG_top"].default_value == 0.25
+    # a layer that was not there is added; one that is gone is black
+    lit.arto.layers = "GROUPS"
+    group_at(lit, "key", 2.0, 0.6, 0.8)
+    picture, _ = relit(lit)
+    assert "LG_key" in node.inputs and "LG_top" in node.inputs
+    for name in ("LG_own Tint",):
+        node.inputs[name].default_value = (1, 1, 1, 1)
+    node.inputs["Exposure"].default_value = 0.0
+    np.testing.assert_allclose(composited(), picture, rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize("patches", [1, 3])
+def test_own_lamps_by_their_light_group(tmp_path, patches):
+    """Each group's layer is what the lamp by itself gives, also beside more than 255 groups of
+    ours; a lamp of no group stays in the layer of the others."""
+    scene = small_scene(tmp_path)
+    scene.render.film_transparent = True
+    scene.arto.samples, scene.arto.patches, scene.arto.keep = 8, patches, "never"
+    lamps = {}
+    for name, angle in (("Key Light", 0.8), ("fill", -0.8), ("", 0.1)):
+        lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "SUN"))
+        lamp.data.energy, lamp.rotation_euler = 2.0 + angle, (0.3, angle, 0)
+        scene.collection.objects.link(lamp)
+        lamp.lightgroup = name
+        lamps[name] = lamp
+        if name:
+            scene.view_layers[0].lightgroups.add(name=name)
+    captured(scene)
+    scene.arto.layers, scene.arto.layers_half = "FACES", False
+    picture, found = relit(scene)
+    assert {"LG_own_Key_Light", "LG_own_fill", "LG_own"} <= set(found)
+    np.testing.assert_allclose(sum(found.values()), picture[..., :3], rtol=1e-5, atol=1e-6)
+    for name, lamp in lamps.items():
+        for other in lamps.values():
+            other.hide_render = other != lamp
+        captured(scene)
+        alone = Field(paths.field_folder(scene)).layer("own")
+        mine = found["LG_own" + (f"_{name.replace(' ', '_')}" if name else "")]
+        assert abs(mine.mean() / alone.mean() - 1) < 0.02
+        assert np.abs(mine - alone).mean() < 0.1 * alone.mean()
+
+
+def test_layers_of_a_shot_with_catchers_sum_to_its_things(tmp_path):
+    scene = small_scene(tmp_path)
+    scene.objects["Floor"].is_shadow_catcher = True
+    scene.render.film_transparent = True
+    scene.arto.samples, scene.arto.patches, scene.arto.keep = 16, 1, "never"
+    scene.arto.layers, scene.arto.layers_half = "FACES", False
+    hdri(scene, smooth())
+    captured(scene)
+    picture, found = relit(scene)
+    np.testing.assert_allclose(sum(found.values()), picture[..., :3], rtol=1e-5, atol=1e-6)
+    assert plate.share_file(paths.relit_file(scene)).is_file()
