@@ -61,6 +61,7 @@ def outlines(scene: bpy.types.Scene, view_layer: str, given: Given, path: Path) 
         on.change("cycles.max_bounces", 0)
         layer = on.scene.view_layers[0]
         layer.use_pass_z = layer.cycles.denoising_store_passes = False
+        layer.cycles.use_pass_shadow_catcher = True
         parts = yield from parts_of(on, "rendering the outlines of the things", 0.98)
         combined = next((p for n, p in parts.items() if n.endswith("Combined")), None)
         if combined is None:

@@ -69,6 +69,12 @@ def _add(tree: Any, source: Any, layer: str) -> None:
     gain.description = "How much of this layer's light is seen"
     tint = tree.interface.new_socket(f"{layer} Tint", in_out="INPUT", socket_type="NodeSocketColor")
     tint.default_value = _WHITE
+    # where the group is in use already, new sockets stand at nothing
+    for other in bpy.data.node_groups:
+        for node in other.nodes:
+            if getattr(node, "node_tree", None) == tree:
+                node.inputs[layer].default_value = 1.0
+                node.inputs[f"{layer} Tint"].default_value = _WHITE
     entry = next(n for n in tree.nodes if n.bl_idname == "NodeGroupInput")
     light = mixed(tree, "MULTIPLY", source.outputs[layer], entry.outputs[f"{layer} Tint"])
     light = mixed(tree, "MULTIPLY", light, entry.outputs[layer])

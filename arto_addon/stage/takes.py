@@ -36,11 +36,13 @@ def take(seen: Rendered, name: str) -> Iterator[None]:
         return
     seen.check()
     wanted: list[tuple[Any, str, bool]] = []
+    if name == MATTE:
+        # Cycles' own catchers are no part of the things' alpha, where shadows have their own pass
+        yield
+        return
     for thing in _originals(seen.flagged):
         _check_still(thing)
         wanted.append((thing, "is_shadow_catcher", False))
-        if name == MATTE:
-            wanted.append((thing, "is_holdout", True))
     if name == GROUND:
         for thing in _originals(seen.things):
             wanted += [(thing, f"visible_{ray}", False) for ray in _RAYS]
@@ -69,7 +71,7 @@ def _check_still(thing: bpy.types.Object) -> None:
             for strip in layer.strips:
                 paths += [c.data_path for bag in strip.channelbags for c in bag.fcurves]
     for path in paths:
-        if path in {"is_shadow_catcher", "is_holdout"} or path.startswith("visible_"):
+        if path == "is_shadow_catcher" or path.startswith("visible_"):
             raise SceneError(
                 f"'{thing.name}' is a shadow catcher whose {path} is animated: remove that "
                 "animation to capture it"

@@ -10,7 +10,9 @@ from .panels import Panel
 class ARTO_UL_groups(bpy.types.UIList):
     """Groups by name."""
 
-    def draw_item(self, _context, layout, _data, item, *_rest) -> None:
+    def draw_item(
+        self, _context, layout, _data, item, _icon, _active_data, _active_property, _index
+    ) -> None:
         layout.prop(item, "name", text="", emboss=False, icon="LIGHT_SUN")
 
 

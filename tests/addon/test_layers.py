@@ -184,7 +184,7 @@ def test_own_lamps_by_their_light_group(tmp_path, patches):
     ours; a lamp of no group stays in the layer of the others."""
     scene = small_scene(tmp_path)
     scene.render.film_transparent = True
-    scene.arto.samples, scene.arto.patches, scene.arto.keep = 8, patches, "never"
+    scene.arto.samples, scene.arto.patches, scene.arto.keep = 64, patches, "never"
     lamps = {}
     for name, angle in (("Key Light", 0.8), ("fill", -0.8), ("", 0.1)):
         lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "SUN"))
