@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,17 @@ from numpy.typing import NDArray
 from .field import Field
 from .field_tile import Model, Tile
 from .light import PatchLight
+from .lights import ROOM, Lights
 from .region import Region
 
-# Lights that are added up at a time by who has many: more take memory, and save no more time.
-TOGETHER = 8
+# Lights that are added up at a time by who has many, and the bytes that their pictures may take.
+TOGETHER, PICTURES = 24, 1 << 30
+
+
+def together(field: Field) -> int:
+    """How many lights are best added up at a time: more would take too much memory."""
+    height, width = field.shape
+    return max(1, min(TOGETHER, PICTURES // (16 * height * width)))
 
 
 def relight(
@@ -40,8 +48,7 @@ def relights(
     """The pictures under some lights, see `relight`: the field is read and unpacked once for all.
 
     cut: no patch gives less than nothing, where a plane laid through a bright spot undershoots: for
-    what is divided by. What is in memory is the pictures; so many lights at once as fit (`TOGETHER`
-    are quick).
+    what is divided by. What is in memory is the pictures; `together` are quick.
     """
     if not lights:
         return []
@@ -72,39 +79,79 @@ def _light(
 ) -> NDArray[np.float32]:
     """The light of all patches on some pixels of a tile -> (L, n, 3)."""
     tile.open()  # which may fail: here, and not in the threads
+    blocks = [i for i, b in enumerate(tile.blocks) if b.stop > asked.start and b.start < asked.stop]
+    out = np.empty((len(lights), asked.stop - asked.start, 3), np.float32)
+    threads = os.cpu_count() or 1
+
+    def put(i: int, where: slice, light: NDArray[np.float32]) -> None:
+        inside = slice(max(where.start, asked.start), min(where.stop, asked.stop))
+        to = slice(inside.start - asked.start, inside.stop - asked.start)
+        out[i, to] = light[inside.start - where.start : inside.stop - where.start]
+
+    # what is cut is no sum of products
+    add = _one_by_one if len(lights) == 1 or cut else _together
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(add(tile, lights, cut, threads, put), blocks))
+    return out
+
+
+Put = Callable[[int, slice, NDArray[np.float32]], None]
+
+
+def _one_by_one(
+    tile: Tile, lights: Sequence[PatchLight], cut: bool, threads: int, put: Put
+) -> Callable[[int], None]:
+    """What adds up a block for each light by itself."""
     # what all blocks share is worked out before the threads start
     tables = [_rest_tables(tile, light) for light in lights]
-    out = np.empty((len(lights), asked.stop - asked.start, 3), np.float32)
-    rooms = [_Room(cut) for _ in range(os.cpu_count() or 1)]
+    rooms = [_Room(cut) for _ in range(threads)]
 
     def add(block: int) -> None:
-        where = tile.blocks[block]
-        n = where.stop - where.start
-        room = rooms.pop()
-        # one light: a pixel a row; more: by channel, and in a row the pixel's light of each
-        total = np.zeros((n, 4) if len(lights) == 1 else (3, n, len(lights)), np.float32)
-        for model in tile.models:
-            for k in np.flatnonzero(model.counts[block]).tolist():
-                if len(lights) == 1:
-                    room.add(total, model, block, k, lights[0])
-                else:
-                    room.add_each(total, model, block, k, lights)
-        rooms.append(room)
-        inside = slice(max(where.start, asked.start), min(where.stop, asked.stop))
-        first, last = inside.start - where.start, inside.stop - where.start
-        to = slice(inside.start - asked.start, inside.stop - asked.start)
+        where, room = tile.blocks[block], rooms.pop()
         ones = tile.ones(where)
-        for i, of in enumerate(tables):
-            light_of = total[:, :3] if len(lights) == 1 else total[..., i].T
-            light_of = light_of * ones
+        for i, (light, of) in enumerate(zip(lights, tables, strict=True)):
+            total = np.zeros((where.stop - where.start, 4), np.float32)
+            for model in tile.models:
+                for k in np.flatnonzero(model.counts[block]).tolist():
+                    room.add(total, model, block, k, light)
+            found = total[:, :3] * ones
             if of is not None:
-                light_of += _rest_light(tile, of, where)
-            out[i, to] = light_of[first:last]
+                found += _rest_light(tile, of, where)
+            put(i, where, found)
+        rooms.append(room)
 
-    blocks = [i for i, b in enumerate(tile.blocks) if b.stop > asked.start and b.start < asked.stop]
-    with ThreadPoolExecutor(len(rooms)) as pool:
-        list(pool.map(add, blocks))
-    return out
+    return add
+
+
+def _together(
+    tile: Tile, lights: Sequence[PatchLight], cut: bool, threads: int, put: Put
+) -> Callable[[int], None]:
+    """What adds up a block for all lights, see `lights`."""
+    every = Lights(tile, lights)
+    rooms = [_Room(cut) for _ in range(threads)]
+
+    def add(block: int) -> None:
+        where, room = tile.blocks[block], rooms.pop()
+        n = where.stop - where.start
+        total = np.zeros((3, len(lights), n), np.float32)
+        for model in tile.models:
+            if every.has(model):
+                every.add(total, model, block, room.wide)
+                continue
+            for i, light in enumerate(lights):
+                alone = np.zeros((n, 4), np.float32)
+                for k in np.flatnonzero(model.counts[block]).tolist():
+                    room.add(alone, model, block, k, light)
+                total[:, i] += alone[:, :3].T
+        total *= tile.ones(where).T[:, None]
+        rest = every.rest(where)
+        if rest is not None:
+            total += rest
+        for i in range(len(lights)):
+            put(i, where, total[:, i].T)
+        rooms.append(room)
+
+    return add
 
 
 class _Room:
@@ -114,6 +161,11 @@ class _Room:
     def __init__(self, cut: bool) -> None:
         self._parts: dict[str, NDArray[np.float32]] = {}
         self._least = np.float32(0 if cut else -np.inf)
+
+    @cached_property
+    def wide(self) -> NDArray[np.float32]:
+        """`lights.ROOM` bytes."""
+        return np.empty(ROOM // 4, np.float32)
 
     def _part(self, name: str, rows: int, n: int) -> NDArray[np.float32]:
         if name not in self._parts or self._parts[name].size < rows * n:
@@ -152,50 +204,6 @@ class _Room:
         for c in range(3):
             sums[:, c] += values[c]
         places[pixels] = ones
-
-    def add_each(
-        self,
-        totals: NDArray[np.float32],
-        model: Model,
-        block: int,
-        k: int,
-        lights: Sequence[PatchLight],
-    ) -> None:
-        """As `add`, of several lights to (3, n, L): what an entry is, is looked up once."""
-        at = model.at(block, k)
-        n = at.stop - at.start
-        shares = self._part("values", 3, n)
-        shares[...] = model.codes[:, at]
-        shares *= shares
-        pixels = model.pixels(block, k)
-        values, sums = self._part("each", n, len(lights)), self._part("sums", n, len(lights))
-        planes = [model.support.plane(light, k) for light in lights]
-        straight = [plane for plane in planes if plane is not None]
-        if len(straight) == len(lights):
-            constants, slopes = (np.stack(each, axis=-1) for each in zip(*straight, strict=True))
-            parameters = self._part("parameters", slopes.shape[1], n)
-            parameters[...] = model.parameters[:, at]
-
-            def average(c: int) -> None:
-                np.matmul(parameters.T, slopes[c] / model.end, out=values)
-                np.add(values, constants[c], out=values)
-
-        else:
-            of = model.parameters_of(at)
-            found = [model.support.average(light, k, of) for light in lights]
-
-            def average(c: int) -> None:
-                for i, each in enumerate(found):
-                    values[:, i] = each[:, c]
-
-        for c, total in enumerate(totals):
-            average(c)
-            if self._least == 0:
-                np.maximum(values, 0, out=values)
-            values *= shares[c][:, None]
-            total.take(pixels, axis=0, out=sums, mode="clip")
-            sums += values
-            total[pixels] = sums
 
 
 def _rest_tables(tile: Tile, light: PatchLight) -> NDArray[np.float32] | None:

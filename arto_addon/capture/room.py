@@ -23,9 +23,9 @@ LEAST_MEGABYTES = 512
 # in Cycles' and in Blender's buffers; of a patch while it is fitted; of what was fitted, its
 # proxies and what writing it takes; of the layers that are no groups.
 ON_DISK = 12
-PER_PASS = 35
-PER_PATCH = 8
-FITTED = 3500
+PER_PASS = 44
+PER_PATCH = 10
+FITTED = 4500
 OTHER_PASSES = 8
 # Of a field on disk, with its layers and proxies: of a pixel, and of each patch in it, about.
 FIELD, FIELD_PATCH = 62, 2.0

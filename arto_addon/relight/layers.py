@@ -20,7 +20,7 @@ from ...core.errors import SceneError
 from ...core.field import Field
 from ...core.layers import REST, by_faces, disc, part_of, residual, share_out, shares
 from ...core.light import PatchLight
-from ...core.relight import TOGETHER, relights
+from ...core.relight import relights, together
 from ...core.shot import safe_name
 from ..work import Progress, Steps
 from ..world.lamp_render import lamp_light
@@ -73,8 +73,9 @@ def pictures_of(
     """What each part of an environment gives to a field's picture, (H, W, 3), by its name."""
     out: dict[str, NDArray[np.float32]] = {}
     names = list(parts)
-    for first in range(0, len(names), TOGETHER):
-        some = names[first : first + TOGETHER]
+    most = together(field)
+    for first in range(0, len(names), most):
+        some = names[first : first + most]
         lights = [PatchLight(part_of(environment, parts[n]), field.hemicube) for n in some]
         found = relights(field, lights, 0.0, cut=cut)
         out |= {name: picture[..., :3] for name, picture in zip(some, found, strict=True)}

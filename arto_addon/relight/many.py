@@ -12,7 +12,7 @@ from typing import Any
 import bpy
 
 from ...core.errors import CaptureSetError, SceneError
-from ...core.relight import TOGETHER, relights
+from ...core.relight import relights, together
 from ...core.shot import Shot, safe_name
 from ..capture.sequence import frame_kept
 from ..shot import paths
@@ -52,11 +52,12 @@ def relight_many(
                 still = _shown(scene, view_layer, still)
             assert still is not None
             every = [(file, turn) for file in worlds or [None] for turn in range(turns)]
-            for first in range(0, len(every), TOGETHER):
+            most = max(1, together(still.field) // len(still.fields))
+            for first in range(0, len(every), most):
                 # the field is read once for so many lights
                 with ExitStack() as lent:
                     ready: list[Ready] = []
-                    for file, turn in every[first : first + TOGETHER]:
+                    for file, turn in every[first : first + most]:
                         number = frame if frames else turn + 1 if turns > 1 else None
                         path = _named(base, file, number)
                         world = _lent(lent, scene, view_layer, file, turn / turns)

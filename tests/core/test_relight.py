@@ -225,3 +225,22 @@ def test_many_lights_at_once_are_each_of_them(fields, noisy, choice: str) -> Non
     for light, picture in zip(lights, together, strict=True):
         np.testing.assert_allclose(picture, relight(fields[choice], light), rtol=2e-6, atol=1e-7)
     assert relights(fields[choice], []) == []
+
+
+def test_cut_no_patch_takes_light_away(fields, noisy) -> None:
+    """A plane through a spot in a patch's corner is below nothing on the other side: cut, each
+    entry gives at least 0, so there is more light than uncut, and many lights are cut alike."""
+    image = np.zeros((64, 128, 3), np.float32)
+    image[5:7, 40:42] = 1000.0
+    lights = [PatchLight(Environment(image), CUBE), PatchLight(noisy(1, 64), CUBE)]
+    plain = relights(fields["linear"], lights)
+    cut = relights(fields["linear"], lights, cut=True)
+    for one, two in zip(plain, cut, strict=True):
+        assert (two[..., :3] >= one[..., :3] - 1e-5 * one.max()).all()
+        assert (two >= 0).all()
+    assert cut[0].sum() > plain[0].sum()
+    # of whole patches there is nothing to cut
+    for one, two in zip(
+        relights(fields["whole"], lights), relights(fields["whole"], lights, cut=True), strict=True
+    ):
+        np.testing.assert_allclose(one, two, rtol=1e-5, atol=1e-7)
