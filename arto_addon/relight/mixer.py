@@ -14,6 +14,7 @@ import bpy
 from ...core import exr
 from .plate import add_footage, mixed, show
 
+EXPOSURE_SOCKET = "Exposure"
 SOURCE, ALPHA, EXPOSURE = "ARTO Layers", "ARTO Alpha", "ARTO Exposure"
 _BLACK, _WHITE = (0.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0, 1.0)
 
@@ -44,7 +45,7 @@ def _new(name: str) -> Any:
     tree = bpy.data.node_groups.new(name, "CompositorNodeTree")
     tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
     tree.interface.new_socket("Alpha", in_out="OUTPUT", socket_type="NodeSocketFloat")
-    tree.interface.new_socket("Exposure", in_out="INPUT", socket_type="NodeSocketFloat")
+    tree.interface.new_socket(EXPOSURE_SOCKET, in_out="INPUT", socket_type="NodeSocketFloat")
     source = tree.nodes.new("CompositorNodeImage")
     source.name, source.location = SOURCE, (-400, 0)
     entry, out = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
@@ -56,7 +57,7 @@ def _new(name: str) -> Any:
     alpha.name, alpha.location = ALPHA, (800, 0)
     alpha.inputs["Type"].default_value = "Replace Alpha"
     link = tree.links.new
-    link(entry.outputs["Exposure"], exposure.inputs["Exposure"])
+    link(entry.outputs[EXPOSURE_SOCKET], exposure.inputs["Exposure"])
     link(exposure.outputs[0], alpha.inputs["Image"])
     link(alpha.outputs[0], out.inputs["Image"])
     return tree

@@ -78,6 +78,7 @@ class ARTO_PT_layers(Panel, bpy.types.Panel):
         if settings.layers != "OFF":
             column.prop(settings, "layer_prefix")
             column.prop(settings, "layers_half")
+            column.operator("arto.mix_to_scene", icon="WORLD_DATA")
         column.prop(settings, "footage")
 
 

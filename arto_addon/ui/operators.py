@@ -17,6 +17,7 @@ from ..capture.planned import guess
 from ..capture.sequence import capture_frames
 from ..fit import fit
 from ..job import session
+from ..relight.back import mix_to_scene
 from ..relight.many import frames_of, relight_frames
 from ..relight.relight import relight
 from ..shot import paths
@@ -289,6 +290,21 @@ class ARTO_OT_discard_unfinished(_Quick):
         return f"removed {gone} unfinished captures" if gone else "there is none unfinished"
 
 
+class ARTO_OT_mix_to_scene(_Quick):
+    """Give the scene a world and lamps that render as the mix of layers in its compositor looks"""
+
+    bl_idname = "arto.mix_to_scene"
+    bl_label = "Mix to Scene"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _free(cls)
+
+    def work(self, context: bpy.types.Context) -> str:
+        return f"wrote {mix_to_scene(context.scene)}, and the scene has it as its world"
+
+
 CLASSES = (
     ARTO_OT_build_hemicube,
     ARTO_OT_remove_hemicube,
@@ -300,4 +316,5 @@ CLASSES = (
     ARTO_OT_cancel,
     ARTO_OT_adopt,
     ARTO_OT_discard_unfinished,
+    ARTO_OT_mix_to_scene,
 )

@@ -11,11 +11,12 @@ import pytest
 from arto.arto_addon import work
 from arto.arto_addon.blender.output import float_exr
 from arto.arto_addon.relight import plate, relight
+from arto.arto_addon.relight.back import mix_to_scene
 from arto.arto_addon.shot import paths
 from arto.core import exr
 from arto.core.errors import SceneError
 from arto.core.field import Field
-from scene_tools import captured, small_scene
+from scene_tools import assert_as_cycles, captured, small_scene
 from test_world import hdri, smooth
 
 
@@ -220,3 +221,45 @@ def test_layers_of_a_shot_with_catchers_sum_to_its_things(tmp_path):
     picture, found = relit(scene)
     np.testing.assert_allclose(sum(found.values()), picture[..., :3], rtol=1e-5, atol=1e-6)
     assert plate.share_file(paths.relit_file(scene)).is_file()
+
+
+def test_a_mix_goes_back_to_the_scene(tmp_path):
+    """The world and the lamps that it gives render to the mix: as Cycles has it, within noise."""
+    scene = small_scene(tmp_path)
+    scene.render.film_transparent = True
+    scene.arto.samples, scene.arto.patches, scene.arto.keep = 512, 4, "never"
+    scene.arto.layers, scene.arto.layers_half = "GROUPS", False
+    group_at(scene, "key", 2.0, 0.6, 0.8)
+    lamps = []
+    for name, angle in (("Rim", 0.8), ("", -0.8)):
+        lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "SUN"))
+        lamp.data.energy, lamp.rotation_euler = 1.0, (0.3, angle, 0)
+        scene.collection.objects.link(lamp)
+        lamp.lightgroup = name
+        lamps.append(lamp)
+    # one lamp's data of two groups
+    lamps[1].data = lamps[0].data
+    scene.view_layers[0].lightgroups.add(name="Rim")
+    hdri(scene, smooth(), rotation=0.4)
+    captured(scene)
+    _, found = relit(scene)
+    node = next(n for n in scene.compositing_node_group.nodes if "LG_key" in n.inputs)
+    gains = {"key": (3.0, (1, 0.5, 0.25)), "rest": (0.2, (1, 1, 1)), "own_Rim": (2.0, (0, 1, 0))}
+    mixed = sum(found.values())
+    for name, (gain, tint) in gains.items():
+        node.inputs[f"LG_{name}"].default_value = gain
+        node.inputs[f"LG_{name} Tint"].default_value = (*tint, 1)
+        mixed = mixed + found[f"LG_{name}"] * (gain * np.array(tint) - 1)
+    node.inputs["Exposure"].default_value = -1.0
+    path = mix_to_scene(scene)
+    assert path.is_file() and scene.world.name == "ARTO Mix"
+    assert_as_cycles(np.dstack([mixed / 2, relit_alpha(scene)]), scene, 512, tmp_path)
+    node.inputs["LG_key"].default_value = 1.0
+    link = scene.compositing_node_group.nodes.new("ShaderNodeValue")
+    scene.compositing_node_group.links.new(link.outputs[0], node.inputs["LG_key"])
+    with pytest.raises(SceneError, match="linked"):
+        mix_to_scene(scene)
+
+
+def relit_alpha(scene):
+    return exr.read(paths.relit_file(scene))[""][..., 3:]

@@ -1,0 +1,138 @@
+"""Back to the scene: a mix found in the compositor, as a world and lamps to render with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core import exr
+from ...core.errors import SceneError
+from ...core.layers import part_of
+from ...core.shot import safe_name
+from ..shot import paths
+from ..shot.shot import layer_of
+from ..world import kept
+from ..world.check import check_world
+from . import layers
+from .mixer import EXPOSURE_SOCKET, SOURCE
+from .relight import Shown
+
+WORLD = "ARTO Mix"
+
+
+@dataclass(frozen=True)
+class Mix:
+    """What a mixer's node does: by layer its gain times its tint, (3,); exposure: in stops."""
+
+    node: Any
+    exposure: float
+
+    def of(self, layer: str) -> NDArray[np.float64]:
+        """(3,), 1 for what is no layer of the mixer's."""
+        inputs = self.node.inputs
+        if layer not in inputs:
+            return np.full(3, 2.0**self.exposure)
+        tint = np.array(inputs[f"{layer} Tint"].default_value[:3], dtype=float)
+        return float(inputs[layer].default_value) * 2.0**self.exposure * tint
+
+
+def mix_of(scene: bpy.types.Scene) -> Mix:
+    """The mix in the scene's compositor. Raises SceneError where there is none, or where something
+    is linked to its sockets, which a lamp cannot follow."""
+    tree = scene.compositing_node_group
+    for node in tree.nodes if tree else ():
+        group = getattr(node, "node_tree", None)
+        if group is None or SOURCE not in group.nodes:
+            continue
+        linked = [socket.name for socket in node.inputs if socket.is_linked]
+        if linked and linked != ["Footage"]:
+            raise SceneError(
+                f"'{linked[0]}' of the mixer is linked: unlink it, so that it is one number"
+            )
+        return Mix(node, float(node.inputs[EXPOSURE_SOCKET].default_value))
+    raise SceneError(
+        "there is no mixer in the compositor: choose Layers, and relight; its node is added there"
+    )
+
+
+def mix_to_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> Path:
+    """Give the scene a world and lamps that render as the mix in its compositor looks; returns the
+    environment map that was written for it.
+
+    The world is a new one; the lamps' energy and colour are multiplied, which can be undone in the
+    window. Raises SceneError, and what opening the field raises.
+    """
+    layer = view_layer or layer_of(scene)
+    mix, settings = mix_of(scene), scene.arto
+    shown = Shown(scene, layer)
+    check_world(scene, layer)
+    whole = kept.environment(scene, settings.environment_width, layer)
+    image = np.zeros_like(whole.image)
+    left = np.ones(whole.image.shape[:2], np.float32)
+    for name, share in layers.parts_of(scene, whole, shown.field).items():
+        gain = mix.of(f"{settings.layer_prefix}{layers.layer_name(name)}")
+        image += part_of(whole, share).image * gain.astype(np.float32)
+        left -= share
+    # light from where no patch is: seen, though it lights nothing
+    image += whole.image * np.maximum(left, 0)[..., None] * np.float32(2.0**mix.exposure)
+    path = paths.relit_file(scene)
+    path = path.with_name(f"{path.stem}_world.exr")
+    exr.write(path, {"": image}, None, bpy.data.colorspace.working_space)
+    _gain_lamps(scene, mix)
+    scene.world = _world_of(path, whole.turn)
+    scene.view_layers[layer].world_override = None
+    return path
+
+
+def _gain_lamps(scene: bpy.types.Scene, mix: Mix) -> None:
+    """Multiply the scene's lamps by their layers' gains."""
+    prefix, own = scene.arto.layer_prefix, scene.arto.own_lamps
+    groups = {g.name for layer in scene.view_layers for g in layer.lightgroups}
+    gained: dict[str, dict[Any, NDArray]] = {}
+    for thing in scene.objects:
+        if thing.type != "LIGHT":
+            continue
+        group = thing.lightgroup if thing.lightgroup in groups else ""
+        name = layers.OWN + (f"_{safe_name(group)}" if group else "")
+        gain = own * mix.of(f"{prefix}{layers.layer_name(name)}")
+        if thing.data.library:
+            if not np.allclose(gain, 1):
+                raise SceneError(f"the lamp '{thing.name}' is linked: make it local to dim it")
+            continue
+        if any(thing.data in lamps for other, lamps in gained.items() if other != name):
+            # shared with a lamp of another layer
+            thing.data = thing.data.copy()
+        gained.setdefault(name, {})[thing.data] = gain
+    for lamps in gained.values():
+        for lamp, gain in lamps.items():
+            most = float(gain.max())
+            lamp.energy *= most
+            if most > 0:
+                lamp.color = np.array(lamp.color[:]) * (gain / most)
+
+
+def _world_of(path: Path, turn: float) -> bpy.types.World:
+    """A world that shows a map, turned."""
+    world = bpy.data.worlds.get(WORLD) or bpy.data.worlds.new(WORLD)
+    tree = world.node_tree
+    tree.nodes.clear()
+    image = bpy.data.images.load(str(path), check_existing=True)
+    image.reload()
+    image.colorspace_settings.name = bpy.data.colorspace.working_space
+    texture = tree.nodes.new("ShaderNodeTexEnvironment")
+    texture.image = image
+    light, out = tree.nodes.new("ShaderNodeBackground"), tree.nodes.new("ShaderNodeOutputWorld")
+    mapping, where = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexCoord")
+    mapping.inputs["Rotation"].default_value = (0, 0, turn)
+    for i, node in enumerate((where, mapping, texture, light, out)):
+        node.location = (300 * i - 900, 0)
+    tree.links.new(where.outputs["Generated"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs[0], texture.inputs["Vector"])
+    tree.links.new(texture.outputs["Color"], light.inputs["Color"])
+    tree.links.new(light.outputs[0], out.inputs["Surface"])
+    return world
