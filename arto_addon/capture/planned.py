@@ -85,6 +85,7 @@ def planned(
             renders = len(plan) * len(tiles)
             paths_traced = region.pixels * settings.samples * len(plan)
             seconds = renders * on.pace.ready + paths_traced * on.pace.path
+            seconds += sum(plan) * len(tiles) * on.pace.layer
         return tiles, room.estimate(plan, tiles, len(hemicube), not kept, seconds)
 
     kept = settings.keep != "never"

@@ -47,32 +47,48 @@ def parts_of(on: Stage, text: str, share: float = 0.0) -> Steps:
 
     share: how far the whole work is.
     """
-    with tempfile.TemporaryDirectory() as folder, _timed(on):
+    with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "small.exr"
         write_to(on.scene.render, path)
         request = Render(on.scene.name, share, text)
-        yield request
+        with _timed() as laps:
+            yield request
         request.check()
         found: dict[str, NDArray] = exr.read(path)
+        on.pace = laps.pace(on, len(found))
         return found
 
 
+class _Laps:
+    """When a render's parts began: the preparation, the paths, the writing, and its end."""
+
+    def __init__(self) -> None:
+        self.begun = self.traced = self.written = self.ended = time.perf_counter()
+
+    def pace(self, on: Stage, layers: int) -> Pace:
+        paths = picture_region(on.scene).pixels * on.scene.cycles.samples
+        return Pace(
+            self.traced - self.begun,
+            (self.written - self.traced) / paths,
+            (self.ended - self.written) / layers,
+        )
+
+
 @contextmanager
-def _timed(on: Stage) -> Iterator[None]:
-    """Note on the stage what a render took: the scene's preparation, and its light paths."""
-    begun = time.perf_counter()
-    first: list[float] = []
+def _timed() -> Iterator[_Laps]:
+    """What a render takes, by what Cycles says that it does."""
+    laps = _Laps()
+    traced: list[float] = []
 
     def told(*arguments: object) -> None:
-        if not first and arguments and "Sample" in str(arguments[0]):
-            first.append(time.perf_counter())
+        says = str(arguments[0]) if arguments else ""
+        if "Sample" in says or "Finished" in says:
+            traced.append(time.perf_counter())
 
     bpy.app.handlers.render_stats.append(told)
     try:
-        yield
+        yield laps
     finally:
         bpy.app.handlers.render_stats.remove(told)
-    ended = time.perf_counter()
-    ready = first[0] if first else begun
-    paths = picture_region(on.scene).pixels * on.scene.cycles.samples
-    on.pace = Pace(ready - begun, (ended - ready) / paths)
+    laps.ended = time.perf_counter()
+    laps.traced, laps.written = (traced[0], traced[-1]) if traced else (laps.begun, laps.ended)

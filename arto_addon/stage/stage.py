@@ -26,10 +26,12 @@ _KEEP_PASSES = {"use_pass_combined", "use_pass_z"}
 
 @dataclass(frozen=True)
 class Pace:
-    """How fast a stage renders. ready: seconds until the first path; path: seconds of one."""
+    """How fast a stage renders. ready: seconds until the first path; path: seconds of one; layer:
+    seconds of writing one."""
 
     ready: float
     path: float
+    layer: float
 
 
 class Stage:
