@@ -269,10 +269,6 @@ def test_bad_scenes(scene):
     with pytest.raises(SceneError, match="Cycles"):
         captured(scene)
     scene.render.engine = "CYCLES"
-    scene.objects["Floor"].is_shadow_catcher = True
-    with pytest.raises(SceneError, match="Floor"):
-        captured(scene)
-    scene.objects["Floor"].is_shadow_catcher = False
     with world_volume(scene), pytest.raises(SceneError, match="volume"):
         captured(scene)
     scene.render.resolution_percentage = 10

@@ -10,11 +10,14 @@ import pytest
 from arto.arto_addon import fit, work
 from arto.arto_addon.blender.output import float_exr
 from arto.arto_addon.capture import capture
+from arto.arto_addon.capture.sequence import capture_frames
+from arto.arto_addon.farm.plan import plan
 from arto.arto_addon.relight import plate, relight
+from arto.arto_addon.relight.many import relight_many
 from arto.arto_addon.shot import paths
 from arto.arto_addon.stage.stage import stage
 from arto.core import exr
-from arto.core.errors import CancelledError, FieldError, SceneError
+from arto.core.errors import CancelledError, FarmError, FieldError, SceneError
 from arto.core.field import Field
 from scene_tools import BOX, add_mesh, captured, differences, set_colour, small_scene, snapshot
 from test_checks import instance_of
@@ -320,3 +323,29 @@ def test_names_of_shapes(tmp_path):
     captured(scene)
     _, share = relit(scene)
     np.testing.assert_allclose(share, 1, atol=0.05)
+
+
+def test_frames_with_a_catcher(tmp_path):
+    """A moving thing throws its shadow where it is, frame by frame."""
+    scene = with_catcher(tmp_path, samples=16, patches=1)
+    scene.objects["Glossy"].hide_render = True
+    box = scene.objects["Matt"]
+    for frame, x in ((1, -2.0), (2, 2.0)):
+        box.location.x = x
+        box.keyframe_insert("location", frame=frame)
+    layer = scene.view_layers[0].name
+    work.run(capture_frames(scene, layer, [1, 2]))
+    done = work.run(relight_many(scene, layer, frames=[1, 2]))
+    left, right = (exr.read(plate.share_file(p))[""].mean(axis=-1) for p in done)
+    half = left.shape[1] // 2
+    assert left[:, :half].mean() < left[:, half:].mean() - 0.02
+    assert right[:, half:].mean() < right[:, :half].mean() - 0.02
+
+
+def test_farms_refuse_catchers(tmp_path):
+    scene = with_catcher(tmp_path, samples=4, patches=1)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    scene = bpy.context.scene
+    with pytest.raises(FarmError, match="one machine"):
+        work.run(plan(scene, scene.view_layers[0].name, tmp_path / "job", [1], None, 1))
+    assert scene.objects["Floor"].is_shadow_catcher
