@@ -11,7 +11,7 @@ from ..core.errors import CaptureSetError, FieldError
 from ..core.field import Field
 from ..core.files import Lock
 from ..core.fit import fit as fit_captured
-from .capture import ground
+from .capture import beside
 from .relight.denoise import cleaned
 from .shot import paths, status
 from .shot.shot import check_same_shot, layer_of, shot_of
@@ -70,10 +70,10 @@ def fit(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     target = (paths.claim(scene, layer) if place.earlier else place.folder) / "field"
     with Lock(target.parent, f"fitting {shot_of(scene, layer).title}"):
         if captured.head.get("catchers"):
-            # first, so that no field of everything is there without that of its ground
-            beside = folder.parent / ground.FOLDER / "capture"
-            yield from _fit_one(scene, CaptureSet(beside), target.parent / ground.FOLDER / "field")
-            ground.add_outlines(beside, target.parent / ground.FOLDER / "field")
+            # first, so that no field of everything is there without those beside it
+            for name in beside.TAKES:
+                there = CaptureSet(folder.parent / name / "capture")
+                yield from _fit_one(scene, there, target.parent / name / "field")
         yield from _fit_one(scene, captured, target)
     paths.forget()
     yield Progress(1.0, f"fitted {len(captured.hemicube)} patches of {captured.pixels} pixels")

@@ -2,7 +2,7 @@
 
 The truth is Cycles' catcher pass at many samples, in two seeds, whose difference is the floor.
 Where things cover a pixel in part, Cycles knows what of it they cover; it is taken from the same
-render of outlines for all methods.
+render for all methods.
 """
 
 from __future__ import annotations
@@ -19,10 +19,11 @@ import bpy
 import numpy as np
 from arto.arto_addon import work
 from arto.arto_addon.blender.output import float_exr
-from arto.arto_addon.capture import capture, ground
+from arto.arto_addon.capture import capture
 from arto.arto_addon.relight import plate, relight
 from arto.arto_addon.shot import paths, scene_id
 from arto.arto_addon.stage.stage import stage
+from arto.arto_addon.stage.takes import THINGS
 from arto.core import exr
 from arto.core.field import Field
 from arto.core.metrics import mean_relative_error
@@ -38,7 +39,7 @@ from .worlds import World
 import bmesh
 
 GROUNDS = ("diffuse", "glossy", "textured", "sloped")
-THINGS = ("diffuse", "metal", "glass", "hair")
+KINDS = ("diffuse", "metal", "glass", "hair")
 HDRIS = ("courtyard", "city", "forest", "interior", "night", "studio", "sunrise", "sunset")
 TURNS = (0.0, 120.0, 240.0)
 # Of these every thing is looked at on every ground; of the others one pair in turn.
@@ -173,7 +174,7 @@ def compare(found: Plate, truth: Plate, other: Plate, things: NDArray) -> dict[s
 
 def cases(quick: bool) -> list[tuple[str, str, World]]:
     """(thing, ground, world): all pairs under two worlds, and each other world on one in turn."""
-    pairs = [(thing, on) for on in GROUNDS for thing in THINGS]
+    pairs = [(thing, on) for on in GROUNDS for thing in KINDS]
     if quick:
         pairs = [("metal", "diffuse"), ("diffuse", "glossy")]
     out = [(*pair, World(name)) for pair in pairs for name in OFTEN]
@@ -212,8 +213,8 @@ def _pair(
         begun = time.perf_counter()
         work.run(capture.capture(scene, scene.view_layers[0].name))
         captured = time.perf_counter() - begun
-        beside = paths.field_folder(scene).parent / ground.FOLDER / "field"
-        things = Field(beside).layer(ground.LAYER)
+        beside = paths.field_folder(scene).parent / THINGS / "field"
+        things = Field(beside).layer("alpha")
         for world in worlds:
             world.apply(scene)
             one, two = (by_cycles(scene, many, seed, things) for seed in (11, 12))

@@ -2,7 +2,8 @@
 
 A ground stands in for what was filmed. It is lit twice, with the scene's things on it and alone,
 and how much the first is of the second is what the things do to the footage: shadows make it less,
-mirrored light more. All three are pictures of one light, so this is no matter of how they were lit.
+mirrored light more. The things by themselves are a third picture. All three are of one light, so
+this is no matter of how they were lit.
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ from numpy.typing import NDArray
 FLOOR = 1e-3
 # No more than so many times as much light comes from a ground beside things as without them.
 MOST = 10.0
-# A pixel that the things cover less of shows the ground alone: the rounding of a mean of many.
-BARE = 1e-4
+# The share of a pixel that is left of the ground from which on its shadow is believed in part, and
+# wholly: below, the outlines' noise is all there is.
+HIDDEN, TRUSTED = 0.1, 0.5
 
 
 @dataclass(frozen=True)
@@ -26,14 +28,12 @@ class Caught:
     """What things do to a picture that they are put into. All (H, W, ...), scene-linear.
 
     colour: (..., 3), the things by themselves, premultiplied by `alpha` (H, W), their coverage;
-    share: (..., 3), how much of what is behind is seen, in their shadows and under them; under:
-    (..., 3), how much of the ground alone is seen.
+    share: (..., 3), how much of what is behind is seen, in their shadows and under them.
     """
 
     colour: NDArray[np.float32]
     alpha: NDArray[np.float32]
     share: NDArray[np.float32]
-    under: NDArray[np.float32]
 
     @property
     def plate(self) -> NDArray[np.float32]:
@@ -41,35 +41,29 @@ class Caught:
         grey = np.clip(1 - self.share.mean(axis=-1), 0, 1)
         return np.dstack([self.colour, grey]).astype(np.float32)
 
-    def colour_of(self, whole: NDArray, ground: NDArray) -> NDArray[np.float32]:
-        """The things by themselves in a part of the light, from both pictures of that part."""
-        things = np.maximum(whole - self.under * ground, 0)
-        return np.where(self.alpha[..., None] <= BARE, 0, things).astype(np.float32)
-
     def over(self, footage: NDArray) -> NDArray[np.float32]:
         """The things in the footage (H, W, 3), as Cycles' shadow catcher pass multiplies it."""
         return (self.colour + self.share * footage).astype(np.float32)
 
 
 def catch(whole: NDArray, ground: NDArray, things: NDArray, there: NDArray | None = None) -> Caught:
-    """Tell the things from the ground that they stand on.
+    """How things and their shadows go into footage.
 
-    whole: (H, W, 3), ground and things; ground: (H, W, 3), the ground alone; both premultiplied,
-    and without noise, or the ratio has all of it. things: (H, W), how much of a pixel they cover;
-    there: (H, W), how much of it the ground covers by itself (default: all).
+    whole: (H, W, 3), ground and things; ground: (H, W, 3), the ground alone; things: (H, W, 4),
+    these alone, where the ground does not hide them. All premultiplied, and without noise, or the
+    ratio has all of it. there: (H, W), how much of a pixel the ground covers by itself (default:
+    all).
     """
     floor = FLOOR * _median(ground, there)
-    ratio = np.clip((whole + floor) / (ground + floor), 0, MOST)
-    bare = things <= BARE
-    ratio = spread(ratio, bare if there is None else bare & (there > 0))
-    seen = (1 - things)[..., None]
-    # no thing is darker than black: where the shadow is deeper than it is around
-    ratio = np.minimum(ratio, (whole + floor) / (seen * ground + floor))
-    colour = np.where(bare[..., None], 0, np.maximum(whole - seen * ratio * ground, 0))
-    covered = np.ones_like(things) if there is None else there
-    share = seen * (1 + covered[..., None] * (ratio - 1))
-    found = (colour, things, share, seen * ratio)
-    return Caught(*(part.astype(np.float32) for part in found))
+    colour, alpha = things[..., :3], things[..., 3]
+    seen = (1 - alpha)[..., None]
+    # what of the ground is seen, beside what would be without shadows
+    ratio = np.clip((whole - colour + floor * seen) / (seen * (ground + floor) + 1e-30), 0, MOST)
+    trusted = np.clip((seen - HIDDEN) / (TRUSTED - HIDDEN), 0, 1)
+    ratio = spread(ratio, trusted if there is None else trusted * (there > 0)[..., None])
+    covered = 1.0 if there is None else there[..., None]
+    share = seen * (1 + covered * (ratio - 1))
+    return Caught(*(part.astype(np.float32) for part in (colour, alpha, share)))
 
 
 def _median(ground: NDArray, there: NDArray | None) -> float:
@@ -79,16 +73,17 @@ def _median(ground: NDArray, there: NDArray | None) -> float:
     return float(np.median(lit)) if lit.size else 1e-6
 
 
-def spread(values: NDArray, known: NDArray[np.bool_]) -> NDArray[np.float32]:
+def spread(values: NDArray, weights: NDArray) -> NDArray[np.float32]:
     """Fill values (H, W, C) in where they are not known from what is known around, smoothly.
 
-    Sums over ever larger squares say what is there on the whole; each finer level keeps what it
-    knows. Where nothing is known at all, 1.
+    weights: (H, W, 1), from 0, not known, to 1, kept as it is. Sums over ever larger squares say
+    what is there on the whole; each finer level keeps what it knows. Where nothing is known at all,
+    1.
     """
-    if known.all():
+    weights = weights.astype(np.float64)
+    if (weights == 1).all():
         return values.astype(np.float32)
-    weights = known.astype(np.float64)[..., None]
-    levels = [(np.where(known[..., None], values, 0).astype(np.float64), weights)]
+    levels = [(np.where(weights > 0, values * weights, 0), weights)]
     while levels[-1][1].shape[0] > 1 or levels[-1][1].shape[1] > 1:
         sums, weights = (_halved(part) for part in levels[-1])
         # four that are known weigh no more than one: else far squares would pull at near ones

@@ -27,7 +27,7 @@ from ..shot.shot import shot_of
 from ..stage.bounds import Rendered, rendered
 from ..stage.settings import prepare
 from ..stage.stage import Stage, picture_region, stage
-from ..stage.takes import WHOLE, take
+from ..stage.takes import THINGS, WHOLE, only_things, take
 from ..work import Steps
 from . import planes
 from .planned import Given, Planned, planned
@@ -84,6 +84,8 @@ def asked(
         grain = settings.grain and settings.route == "all"
         patterns = pattern_set(settings.patterns)
         prepare(on, layers=len(patterns) + grain)
+        if name == THINGS:
+            only_things(on.scene.view_layers[0])
         shot = shot_of(scene, view_layer, region)
         decides = {
             "samples": settings.samples,

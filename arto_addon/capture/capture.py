@@ -24,9 +24,8 @@ from ..relight.denoise import cleaned
 from ..shot import paths
 from ..shot.shot import shot_of
 from ..stage.stage import Stage, set_region
-from ..stage.takes import GROUND
 from ..work import Progress, Render, Steps
-from . import ground, planes
+from . import beside, planes
 from .asked import asked, begun
 from .check import check_scene
 from .plan import SAMPLED, render_plan
@@ -88,14 +87,15 @@ def _capture(
         if head is None or only_estimate:
             plan, head = yield from begun(this, folder, given)
             if only_estimate:
-                return plan.estimate.twice if this.catchers else plan.estimate
+                takes = 1 + len(beside.TAKES) * this.catchers
+                return plan.estimate.times(takes)
             empty(folder)
         yield from _render_tiles(this.on, folder, head)
-    beside = claimed / ground.FOLDER
-    if this.catchers:
-        yield from _capture_ground(scene, view_layer, beside, head)
-    else:
-        empty(beside)
+    for name in beside.TAKES:
+        if this.catchers:
+            yield from _capture_beside(scene, view_layer, claimed / name, name, head)
+        else:
+            empty(claimed / name)
     yield from _finish(scene, folder, claimed, head)
     paths.forget()
     caution = f". CAUTION: {head['caution']['text']}" if head.get("caution") else ""
@@ -103,23 +103,22 @@ def _capture(
     return claimed / "capture"
 
 
-def _capture_ground(
-    scene: bpy.types.Scene, view_layer: str, beside: Path, first: dict[str, Any]
+def _capture_beside(
+    scene: bpy.types.Scene, view_layer: str, place: Path, name: str, first: dict[str, Any]
 ) -> Steps:
-    """Capture the catchers alone, for the take of everything that `first` describes."""
-    given = ground.given_by(first)
-    with asked(scene, view_layer, given, GROUND) as this:
-        folder = paths.unfinished_folder(beside, this.key)
+    """Capture a take beside the one of everything, which `first` describes."""
+    given = beside.given_by(first)
+    with asked(scene, view_layer, given, name) as this:
+        folder = paths.unfinished_folder(place, this.key)
         head = unfinished(folder, this.key)
-        if head is None and ground.is_there(beside / "capture", this.key, first["key"]):
+        if head is None and beside.is_there(place / "capture", this.key, first["key"]):
             return
         if head is None:
             _, head = yield from begun(this, folder, given, len(first["tiles"]))
             empty(folder)
-        head[ground.PAIR] = first["key"]
+        head[beside.PAIR] = first["key"]
         yield from _render_tiles(this.on, folder, head)
-    yield from ground.outlines(scene, view_layer, given, folder / ground.OUTLINES)
-    yield from _finish(scene, folder, beside, head)
+    yield from _finish(scene, folder, place, head)
 
 
 def _finish(scene: bpy.types.Scene, unfinished: Path, place: Path, head: dict[str, Any]) -> Steps:
@@ -127,8 +126,6 @@ def _finish(scene: bpy.types.Scene, unfinished: Path, place: Path, head: dict[st
     if not head["kept"]:
         finish_field(unfinished, place / "field", head)
         yield from cleaned(scene, place / "field")
-        if head.get("take") == GROUND:
-            ground.add_outlines(unfinished, place / "field")
     finish(unfinished, place / "capture")
 
 

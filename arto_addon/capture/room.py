@@ -87,12 +87,11 @@ class Estimate:
     def to_json(self) -> dict[str, Any]:
         return asdict(self)
 
-    @property
-    def twice(self) -> Estimate:
-        """Of a shot with shadow catchers, of which there are two takes."""
-        seconds = None if self.seconds is None else 2 * self.seconds
-        disk, kept = self.disk + self.kept, 2 * self.kept
-        return Estimate(seconds, self.memory, disk, kept, 2 * self.renders + 1)
+    def times(self, takes: int) -> Estimate:
+        """Of a shot of which there are so many takes, one after the other."""
+        seconds = None if self.seconds is None else takes * self.seconds
+        disk, kept = self.disk + (takes - 1) * self.kept, takes * self.kept
+        return Estimate(seconds, self.memory, disk, kept, takes * self.renders)
 
     @property
     def line(self) -> str:

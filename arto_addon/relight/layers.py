@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core import exr
-from ...core.catcher import Caught
 from ...core.environment import Environment
 from ...core.errors import SceneError
 from ...core.field import Field
@@ -68,7 +67,7 @@ def parts_of(
 
 
 def pictures_of(
-    field: Field, environment: Environment, parts: dict[str, NDArray[np.float32]], cut: bool
+    field: Field, environment: Environment, parts: dict[str, NDArray[np.float32]]
 ) -> dict[str, NDArray[np.float32]]:
     """What each part of an environment gives to a field's picture, (H, W, 3), by its name."""
     out: dict[str, NDArray[np.float32]] = {}
@@ -77,7 +76,7 @@ def pictures_of(
     for first in range(0, len(names), most):
         some = names[first : first + most]
         lights = [PatchLight(part_of(environment, parts[n]), field.hemicube) for n in some]
-        found = relights(field, lights, 0.0, cut=cut)
+        found = relights(field, lights, 0.0)
         out |= {name: picture[..., :3] for name, picture in zip(some, found, strict=True)}
     return out
 
@@ -90,30 +89,15 @@ def lamp_shares(lamps: Environment, parts: dict[str, NDArray[np.float32]]) -> di
     return {name: share for name, share in found.items() if share > LEAST_LAMPS}
 
 
-def of_plate(shown: Shown, ready: Ready, caught: Caught | None) -> Steps:
-    """The layers of a plate, (H, W, 3) each, by name, denoised where the plate is.
-
-    caught: of a shot with shadow catchers, whose things alone are in layers.
-    """
+def of_plate(shot: Shown, ready: Ready) -> Steps:
+    """The layers of a plate, (H, W, 3) each, by name, denoised where the plate is; of a shot with
+    shadow catchers, of its things alone."""
+    shown, rendered = shot.takes[-1], ready.rendered[-1]
     parts = parts_of(shown.scene, ready.whole, shown.field)
-    found = yield from _of_take(shown, ready, ready.parts, parts, caught is not None)
-    if caught and shown.ground:
-        beside = yield from _of_take(shown.ground, ready, ready.ground_parts, parts, True)
-        found = {name: caught.colour_of(found[name], beside[name]) for name in found}
-    return found
-
-
-def _of_take(
-    shown: Shown,
-    ready: Ready,
-    rendered: list[NDArray[np.float32]],
-    parts: dict[str, NDArray[np.float32]],
-    cut: bool,
-) -> Steps:
     scene, field = shown.scene, shown.field
     yield Progress(0.9, f"relighting {len(parts)} layers")
     rest = ready.found.rest if rendered else ready.whole
-    found = pictures_of(field, rest, parts, cut)
+    found = pictures_of(field, rest, parts)
     for lamps in rendered:
         some = lamp_shares(ready.found.lamps, parts)
         for name, share in some.items():

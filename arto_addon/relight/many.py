@@ -12,7 +12,7 @@ from typing import Any
 import bpy
 
 from ...core.errors import CaptureSetError, SceneError
-from ...core.relight import relights, together
+from ...core.relight import together
 from ...core.shot import Shot, safe_name
 from ..capture.sequence import frame_kept
 from ..shot import paths
@@ -52,7 +52,7 @@ def relight_many(
                 still = _shown(scene, view_layer, still)
             assert still is not None
             every = [(file, turn) for file in worlds or [None] for turn in range(turns)]
-            most = max(1, together(still.field) // len(still.fields))
+            most = max(1, together(still.field) // len(still.takes))
             for first in range(0, len(every), most):
                 # the field is read once for so many lights
                 with ExitStack() as lent:
@@ -66,10 +66,7 @@ def relight_many(
                         yield Progress(len(done) / total, text)
                         steps = make_ready(still, Light(path, look, world))
                         ready.append((yield from _quietly(steps, len(done) / total)))
-                    lights = [r.light for r in ready]
-                    cut = still.ground is not None
-                    by_field = [relights(f, lights, 0.0, cut=cut) for f in still.fields]
-                    pictures = [list(takes) for takes in zip(*by_field, strict=True)]
+                    pictures = still.pictures([r.light for r in ready])
                     while ready:
                         one = ready.pop(0)
                         one.laps.go_on()

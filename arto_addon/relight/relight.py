@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -21,7 +21,7 @@ from ...core.lamps import Split, split
 from ...core.light import PatchLight
 from ...core.region import Region
 from ...core.relight import over, relights
-from ..capture import ground
+from ..capture import beside
 from ..capture.plan import SAMPLED
 from ..shot import paths
 from ..shot.shot import check_same_shot, layer_of
@@ -77,21 +77,29 @@ class Shown:
         self.field = Field(folder)
         self._changed: dict[tuple[int, float], list[str]] = {}
         self.held = self.field.about.get("route") == SAMPLED
-        self.ground: Shown | None = None
+        # of a shot with shadow catchers: of everything, of the catchers, of the things
+        self.takes = [self]
         if self.field.about.get("catchers") and not self.field.about.get("take"):
-            self.ground = self._ground(folder)
+            self.takes += [self._beside(folder.parent / name / "field") for name in beside.TAKES]
 
-    def _ground(self, folder: Path) -> Shown:
-        """The take of the shadow catchers alone. Raises FieldError."""
-        beside = folder.parent / ground.FOLDER / "field"
-        found = Shown(self.scene, self.layer, beside)
-        pair, key = found.field.about.get(ground.PAIR), self.field.about.get("key")
-        if pair != key or not found.field.has_layer(ground.LAYER):
+    def _beside(self, folder: Path) -> Shown:
+        """Another take of the shot. Raises FieldError."""
+        found = Shown(self.scene, self.layer, folder)
+        if found.field.about.get(beside.PAIR) != self.field.about.get("key"):
             raise FieldError(
-                f"the shadow catchers in {beside} were captured for another picture: run Capture "
-                "again, it goes on where it stopped"
+                f"what is in {folder} was captured for another picture: run Capture again, it goes "
+                "on where it stopped"
             )
         return found
+
+    def pictures(self, lights: Sequence[PatchLight]) -> list[list[NDArray[np.float32]]]:
+        """For each light what each take's field shows in it, (H, W, 4)."""
+        # the first two are divided by each other
+        cut = [len(self.takes) > 1 and take is not self.takes[-1] for take in self.takes]
+        found = [
+            relights(t.field, lights, 0.0, cut=c) for t, c in zip(self.takes, cut, strict=True)
+        ]
+        return [list(each) for each in zip(*found, strict=True)]
 
     def changed(self) -> list[str]:
         """What of the scene is not as it was captured, at its frame."""
@@ -100,11 +108,6 @@ class Shown:
             found = changed_since(self.scene, self.layer, self.field.about, now=True)
             self._changed = {frame: found}
         return self._changed[frame]
-
-    @property
-    def fields(self) -> list[Field]:
-        """The fields of its takes."""
-        return [self.field, *([self.ground.field] if self.ground else [])]
 
     @cached_property
     def guides(self) -> dict[str, NDArray]:
@@ -146,17 +149,16 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
 class Ready:
     """A light, made ready to be shown in: its lamps are rendered, its bins are full.
 
-    whole: its environment; found: that without lamps, and these; parts: pictures of the lamps, none
-    or one, and ground_parts those of shadow catchers alone; lamps: what was done with them, in
-    words; together: whether they have nearly all light.
+    whole: its environment; found: that without lamps, and these; rendered: for each take, pictures
+    of the lamps, none or one; lamps: what was done with them, in words; together: whether they have
+    nearly all light.
     """
 
     lit: Light
     world: bpy.types.World
     whole: Environment
     found: Split
-    parts: list[NDArray[np.float32]]
-    ground_parts: list[NDArray[np.float32]]
+    rendered: list[list[NDArray[np.float32]]]
     lamps: str
     together: bool
     light: PatchLight
@@ -186,9 +188,7 @@ def show(shown: Shown, lit: Light) -> Steps:
     """Write the picture of a field in a light; returns seconds by part. Raises as `compute`."""
     ready = yield from make_ready(shown, lit)
     yield Progress(0.6, "relighting")
-    cut = shown.ground is not None
-    pictures = [relights(field, [ready.light], 0.0, cut=cut)[0] for field in shown.fields]
-    return (yield from finish(shown, ready, pictures))
+    return (yield from finish(shown, ready, shown.pictures([ready.light])[0]))
 
 
 def make_ready(shown: Shown, lit: Light) -> Steps:
@@ -201,7 +201,7 @@ def make_ready(shown: Shown, lit: Light) -> Steps:
     if changed:
         # allowed: it is the artist who knows whether it shows
         yield Progress(0.0, f"the scene is not the captured one: {'; '.join(changed[:3])}")
-    if shown.ground:
+    if len(shown.takes) > 1:
         footage(scene)  # what cannot be read is said before the long work
     yield Progress(0.0, "bringing the world to an environment map")
     if by_rays := differs_by_rays(world):
@@ -210,27 +210,14 @@ def make_ready(shown: Shown, lit: Light) -> Steps:
     laps.lap("world")
     found = split(whole, None if field.hemicube.closed else field.hemicube)
     parts, lamps, together = yield from _lamps(shown, found)
-    ground_parts = []
-    if shown.ground and parts:
-        ground_parts, _, _ = yield from _lamps(shown.ground, found)
+    rendered = [parts]
+    for take in shown.takes[1:]:
+        rendered.append((yield from _lamps(take, found))[0] if parts else [])
     laps.lap("lamps")
     yield Progress(0.5, "bringing the environment to the patches")
     light = PatchLight(found.rest if parts else whole, field.hemicube)
     laps.lap("light")
-    return Ready(
-        lit,
-        world,
-        whole,
-        found,
-        parts,
-        ground_parts,
-        lamps,
-        together,
-        light,
-        changed,
-        by_rays,
-        laps,
-    )
+    return Ready(lit, world, whole, found, rendered, lamps, together, light, changed, by_rays, laps)
 
 
 def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> Steps:
@@ -239,32 +226,29 @@ def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> S
     scene, lit = shown.scene, ready.lit
     settings, path = scene.arto, lit.path
     lap = ready.laps.lap
-    picture, parts = pictures[0], ready.parts
-    parts = yield from _with_own(shown, ready, picture, parts)
-    beside: list[NDArray] = []
-    if shown.ground:
-        beside = yield from _with_own(shown.ground, ready, pictures[1], ready.ground_parts)
+    summed = []
+    for take, picture, parts in zip(shown.takes, pictures, ready.rendered, strict=True):
+        summed.append((yield from _with_own(take, ready, picture, parts)))
     lap("relight")
     denoised = "no"
     if settings.denoise:
         yield Progress(0.7, "denoising")
         if denoise.available():
-            parts = _denoised(shown, parts)
-            beside = _denoised(shown.ground, beside) if shown.ground else []
+            summed = [_denoised(t, parts) for t, parts in zip(shown.takes, summed, strict=True)]
             denoised = "Open Image Denoise"
         else:
             # said here, in the file's header and in the last line
             denoised = "no: this Blender was built without Open Image Denoise"
             yield Progress(0.7, f"denoising: {denoised}")
         lap("denoise")
-    picture[..., :3] = sum(parts)
-    # a plane laid through a sun beside darkness undershoots; a picture has no negative light
-    np.maximum(picture, 0, out=picture)
-    caught = None
-    if shown.ground:
-        under = np.maximum(sum(beside), 0)
-        covered = shown.ground.field.layer(ground.LAYER)
-        caught = catch(picture[..., :3], under, covered, pictures[1][..., 3])
+    for picture, parts in zip(pictures, summed, strict=True):
+        picture[..., :3] = sum(parts)
+        # a plane laid through a sun beside darkness undershoots; a picture has no negative light
+        np.maximum(picture, 0, out=picture)
+    picture, caught = pictures[0], None
+    if len(pictures) > 1:
+        whole, alone, apart = pictures
+        caught = catch(whole[..., :3], alone[..., :3], apart, alone[..., 3])
         picture = caught.plate
         lap("catcher")
     things = picture[..., :3].copy()
@@ -294,7 +278,7 @@ def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> S
         plate.write(scene, plate.share_file(path), caught.share, about)
         yield from _into_footage(shown, caught, path, about)
     if settings.layers != "OFF":
-        found = yield from layers.of_plate(shown, ready, caught)
+        found = yield from layers.of_plate(shown, ready)
         if not scene.render.film_transparent:
             found[layers.BEHIND] = picture[..., :3] - things
         yield from layers.write(scene, path, picture, found, *plate.header_of(scene, about))

@@ -241,7 +241,7 @@ def adopt(scene: bpy.types.Scene, view_layer: str, source: Path) -> Path:
     replaced. Raises SceneError.
     """
     folder = claim(scene, view_layer)
-    for name in ("capture", "field", "ground"):
+    for name in ("capture", "field", "ground", "things"):
         if (source / name).is_dir() and not (folder / name).exists():
             partial = folder / f"{name}.part"
             try:

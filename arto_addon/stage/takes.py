@@ -1,8 +1,8 @@
-"""Takes: a shot with shadow catchers is captured twice, and once more for its outlines.
+"""Takes: a shot with shadow catchers is captured three times.
 
-Cycles gives shadow catchers no light groups. So what is on the ground is told from the ground by
-two pictures of the same light: everything as ordinary things, and the catchers alone. What the
-things cover is a third, quick one. See `core.catcher`.
+Cycles gives the light on shadow catchers no light groups. So what is on the ground is told from the
+ground by pictures of the same light: everything as ordinary things; the catchers alone; and the
+things alone, which is what the light groups show of a scene with catchers. See `core.catcher`.
 
 Flags of objects say what is in a take. They are the artist's objects, which the stage shares: they
 are put back on every way out.
@@ -20,8 +20,8 @@ from ...core.errors import SceneError
 from .bounds import Name, Rendered
 
 # The names of takes: of everything, which is the only one where nothing catches shadows; of the
-# catchers alone; of what the things cover.
-WHOLE, GROUND, MATTE = "", "ground", "matte"
+# catchers alone; of the things alone.
+WHOLE, GROUND, THINGS = "", "ground", "things"
 # What rays an object is seen by.
 _RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
 
@@ -36,8 +36,7 @@ def take(seen: Rendered, name: str) -> Iterator[None]:
         return
     seen.check()
     wanted: list[tuple[Any, str, bool]] = []
-    if name == MATTE:
-        # Cycles' own catchers are no part of the things' alpha, where shadows have their own pass
+    if name == THINGS:
         yield
         return
     for thing in _originals(seen.flagged):
@@ -76,3 +75,8 @@ def _check_still(thing: bpy.types.Object) -> None:
                 f"'{thing.name}' is a shadow catcher whose {path} is animated: remove that "
                 "animation to capture it"
             )
+
+
+def only_things(layer: bpy.types.ViewLayer) -> None:
+    """Have the alpha of a take of the things alone without the shadows, which have a pass then."""
+    layer.cycles.use_pass_shadow_catcher = True

@@ -23,41 +23,41 @@ def disc(radius=0.12, soft=0.05):
     return np.clip((radius + soft - r) / soft, 0, 1)
 
 
+def plate(alpha, colour=(0, 0, 0)):
+    """Things of one colour, premultiplied, (H, W, 4)."""
+    return np.dstack([alpha[..., None] * np.array(colour), alpha])
+
+
+NOTHING = np.zeros((*SIZE, 4))
+
+
 @pytest.fixture
 def rng():
     return np.random.default_rng(3)
 
 
-def test_parts_come_back(rng):
-    """A thing with a soft outline on a shadowed ground: both are told apart, and the footage gets
-    the shadow it would get."""
+def test_shadows_come_back(rng):
+    """Of a thing with a soft outline on a shadowed ground: the footage gets the shadow that it
+    would get if it were the ground."""
     ground, shadow = ground_of(rng)
     things, colour = disc(), np.array([0.9, 0.4, 0.1])
     whole = things[..., None] * colour + (1 - things)[..., None] * shadow * ground
-    found = catch(whole, ground, things)
+    found = catch(whole, ground, plate(things, colour))
     bare = things == 0
     np.testing.assert_allclose(found.share[bare], shadow[bare], rtol=5e-3)
-    assert (found.colour[bare] == 0).all()
-    # under the outline the shadow is a guess from around it, and what it is off by is small
-    np.testing.assert_allclose(found.colour, things[..., None] * colour, atol=0.04)
+    np.testing.assert_allclose(found.colour, things[..., None] * colour, rtol=1e-6)
     footage = rng.uniform(0.1, 1, (*SIZE, 3))
     truth = things[..., None] * colour + (1 - things)[..., None] * shadow * footage
-    np.testing.assert_allclose(found.over(footage), truth, atol=0.06)
+    np.testing.assert_allclose(found.over(footage)[bare], truth[bare], atol=5e-3)
+    # under the outline the shadow is a guess from around it, and what it is off by is small
+    assert np.abs(found.over(footage) - truth).max() < 0.15
     assert np.abs(found.over(footage) - truth).mean() < 0.003
-
-
-def test_over_the_modelled_ground_itself_it_is_the_whole_picture(rng):
-    """Footage that is the ground alone gives back the picture of both, outlines and all."""
-    ground, shadow = ground_of(rng)
-    things = disc()
-    whole = things[..., None] * 0.5 + (1 - things)[..., None] * shadow * ground
-    np.testing.assert_allclose(catch(whole, ground, things).over(ground), whole, atol=2e-3)
 
 
 def test_nothing_stands_there(rng):
     """Footage passes unchanged, whatever light the ground has, dark and noisy too."""
     ground = rng.exponential(size=(*SIZE, 3)) * rng.choice([0, 1e-6, 1, 50], size=(*SIZE, 1))
-    found = catch(ground, ground, np.zeros(SIZE))
+    found = catch(ground, ground, NOTHING)
     assert (found.share == 1).all() and (found.colour == 0).all()
     assert (found.plate == 0).all()
     footage = rng.uniform(size=(*SIZE, 3)).astype(np.float32)
@@ -68,7 +68,7 @@ def test_where_the_ground_ends(rng):
     """Half covered by the ground, a pixel has half of its shadow; beyond it none."""
     ground, shadow = ground_of(rng)
     there = np.repeat(np.linspace(-0.5, 1.5, SIZE[0]).clip(0, 1)[:, None], SIZE[1], axis=1)
-    found = catch(ground * shadow * there[..., None], ground * there[..., None], 0 * there, there)
+    found = catch(ground * shadow * there[..., None], ground * there[..., None], NOTHING, there)
     expected = 1 + there[..., None] * (shadow - 1)
     np.testing.assert_allclose(found.share, expected, atol=0.02)
     np.testing.assert_array_equal(found.share[there == 0], 1)
@@ -79,11 +79,11 @@ def test_darkness_is_no_noise(rng):
     ground, _ = ground_of(rng)
     ground[:, : SIZE[1] // 2] *= 1e-7
     noisy = [np.maximum(ground * rng.normal(1, 0.3, ground.shape), 0) for _ in range(2)]
-    found = catch(*noisy, np.zeros(SIZE))
+    found = catch(*noisy, NOTHING)
     assert np.abs(found.share[:, : SIZE[1] // 2 - 1] - 1).max() < 1e-2
-    black = catch(0 * ground, 0 * ground, disc())
+    black = catch(0 * ground, 0 * ground, plate(disc()))
     assert (black.share[disc() == 0] == 1).all() and np.isfinite(black.share).all()
-    bright = catch(ground + 1e9, ground, np.zeros(SIZE))
+    bright = catch(ground + 1e9, ground, NOTHING)
     assert bright.share.max() <= MOST
 
 
@@ -92,7 +92,8 @@ def test_light_and_shadow_have_no_unit(rng):
     ground, shadow = ground_of(rng)
     things = disc()
     whole = things[..., None] * 0.5 + (1 - things)[..., None] * shadow * ground
-    one, many = catch(whole, ground, things), catch(100 * whole, 100 * ground, things)
+    one = catch(whole, ground, plate(things, (0.5, 0.5, 0.5)))
+    many = catch(100 * whole, 100 * ground, plate(things, (50, 50, 50)))
     np.testing.assert_allclose(many.share, one.share, rtol=1e-5)
     np.testing.assert_allclose(many.colour, 100 * one.colour, rtol=1e-4, atol=1e-4)
 
@@ -102,7 +103,7 @@ def test_plate_is_as_cycles_has_it(rng):
     ground, shadow = ground_of(rng)
     things = disc()
     whole = things[..., None] * 0.5 + (1 - things)[..., None] * shadow * ground
-    found = catch(whole, ground, things)
+    found = catch(whole, ground, plate(things, (0.5, 0.5, 0.5)))
     expected = things + (1 - things) * (1 - shadow.mean(axis=-1))
     np.testing.assert_allclose(found.plate[..., 3][things == 0], expected[things == 0], atol=5e-3)
     # the shadow under an outline is a guess
@@ -114,10 +115,12 @@ def test_spread_is_smooth_and_keeps_what_is_known(rng):
     y, x = np.mgrid[: SIZE[0], : SIZE[1]] / SIZE[1]
     plane = np.dstack([x, y, 1 - x])
     known = disc(0.1, 0.01) == 0
-    found = spread(np.where(known[..., None], plane, 99.0), known)
+    found = spread(np.where(known[..., None], plane, 99.0), known[..., None])
     np.testing.assert_allclose(found[known], plane[known], rtol=1e-6)
     assert np.abs(found - plane)[~known].max() < 0.1
-    assert (spread(plane, np.zeros(SIZE, bool)) == 1).all()
+    assert (spread(plane, np.zeros((*SIZE, 1))) == 1).all()
     one = np.zeros(SIZE, bool)
     one[5, 7] = True
-    np.testing.assert_allclose(spread(plane, one), np.broadcast_to(plane[5, 7], plane.shape))
+    np.testing.assert_allclose(
+        spread(plane, one[..., None]), np.broadcast_to(plane[5, 7], plane.shape)
+    )
