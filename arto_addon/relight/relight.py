@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -76,6 +76,7 @@ class Shown:
                 check_same_shot(scene, near, "the reflectance field", view_layer)
         self.field = Field(folder)
         self._changed: dict[tuple[int, float], list[str]] = {}
+        self._split: tuple[NDArray[np.float32], Split] | None = None
         self.held = self.field.about.get("route") == SAMPLED
         # of a shot with shadow catchers: of everything, of the catchers, of the things
         self.takes = [self]
@@ -108,6 +109,17 @@ class Shown:
             found = changed_since(self.scene, self.layer, self.field.about, now=True)
             self._changed = {frame: found}
         return self._changed[frame]
+
+    def split(self, whole: Environment) -> Split:
+        """The lamps cut out of a light. Where patches are all around, a turned map is cut as it was
+        before."""
+        if not self.field.hemicube.closed:
+            return split(whole, self.field.hemicube)
+        if self._split is None or self._split[0] is not whole.image:
+            self._split = whole.image, split(whole)
+        found = self._split[1]
+        rest, lamps = (replace(part, turn=whole.turn) for part in (found.rest, found.lamps))
+        return Split(rest, lamps, found.share)
 
     @cached_property
     def guides(self) -> dict[str, NDArray]:
@@ -208,7 +220,7 @@ def make_ready(shown: Shown, lit: Light) -> Steps:
         yield Progress(0.0, f"the world is {by_rays}")
     whole = kept.environment(scene, settings.environment_width, layer, lit.world)
     laps.lap("world")
-    found = split(whole, None if field.hemicube.closed else field.hemicube)
+    found = shown.split(whole)
     parts, lamps, together = yield from _lamps(shown, found)
     rendered = [parts]
     for take in shown.takes[1:]:

@@ -32,6 +32,9 @@ from .detail import values_only
 VERSION = 1
 # So many maps stay, the ones that were used last.
 MOST = 12
+# The last map stays in memory too, if it has no more bytes: a turntable shows nothing else.
+LAST = 1 << 27
+_last: dict[str, Any] = {}
 
 
 def environment(
@@ -47,11 +50,17 @@ def environment(
     world = world or check_world(scene, view_layer)
     with _without_dials(world) as (plain, strength, turn):
         path = paths.worlds_folder(scene) / f"{_key(scene, plain, width)}.npy"
+        if _last.get("key") == (path, strength):
+            return Environment(_last["image"], turn)
         image = _read(path, width)
         if image is None:
             image = bake(scene, width, view_layer, plain).image
             _write(path, image)
-    return Environment(image * np.float32(strength), turn)
+    image = image * np.float32(strength)
+    _last.clear()
+    if image.nbytes <= LAST:
+        _last.update(key=(path, strength), image=image)
+    return Environment(image, turn)
 
 
 def _read(path: Path, width: int) -> np.ndarray | None:
