@@ -11,7 +11,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...core.basis_images import GRAIN, group_name
+from ...core.basis_images import GRAIN, GROUP, group_name
 from ...core.hemicube import FACE_NAMES, Hemicube
 from ...core.patterns import PatternSet, pattern_set
 from ..blender.nodes import Nodes
@@ -233,7 +233,8 @@ def lit(
         build(collection, hemicube, patterns, images, note, free_mark(), sampled)
         # first: they are sampled, and of those Cycles can only tell the first groups apart
         for name in on.own_groups if own else ():
-            layer.lightgroups.add(name=name)
+            if not GROUP.search(f"Combined_{name}"):  # one that is named like ours stays in `own`
+                layer.lightgroups.add(name=name)
         for plane in collection.objects:
             layer.lightgroups.add(name=plane.lightgroup)
         yield

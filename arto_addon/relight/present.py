@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -9,8 +10,14 @@ from typing import Any
 import bpy
 
 from ...core import exr
+from ..shot.shot import layer_of
 from .mixer import mixer
 from .plate import CATCHER, LAYERS, SOURCE, layers_file, name_of, node_group, share_file, show
+
+# What the name of a plate's mixer has after the plate's.
+MIX = " Mix"
+# On a node of ours: the links that it took over, as JSON.
+TAKEN = "arto_taken"
 
 
 def present(scene: bpy.types.Scene, path: Path, look: str | None = None) -> bpy.types.Image:
@@ -23,8 +30,11 @@ def present(scene: bpy.types.Scene, path: Path, look: str | None = None) -> bpy.
     image, header = show(path, name), exr.header(path)
     share = show(share_file(path), f"{name} Catcher") if CATCHER in header else None
     if LAYERS in header:
-        wire(scene, mixer(layers_file(path), f"{name} Mix", share))
-    if wire(scene, node_group(image, name, share)) is None:
+        wire(scene, mixer(layers_file(path), name + MIX, share))
+    node = wire(scene, node_group(image, name, share))
+    if node is not None:
+        use(scene)
+    else:
         tree = scene.compositing_node_group.name
         print(f"ARTO: the compositor '{tree}' is linked and stays as it is: add '{name}' to it")
     if not bpy.app.background and bpy.context.window_manager.windows:
@@ -89,3 +99,50 @@ def wire(scene: bpy.types.Scene, group: Any) -> Any:
             viewer.location = (node.location.x + 500, node.location.y)
             tree.links.new(node.outputs["Image"], viewer.inputs["Image"])
     return node
+
+
+def use(scene: bpy.types.Scene) -> None:
+    """Have the scene's compositor use the plate as its setting says: instead of the render that it
+    is of, or in a viewer alone. The mixer comes before the plate where layers are written."""
+    tree = scene.compositing_node_group
+    if tree is None or not tree.is_editable:
+        return
+    name = name_of(scene)
+    ours = {n.node_tree.name: n for n in tree.nodes if getattr(n, "node_tree", None)}
+    mix, plain = ours.get(name + MIX), ours.get(name)
+    for node in (mix, plain):
+        if node is not None:
+            _give_back(tree, node)
+    wanted = mix if mix is not None and scene.arto.layers != "OFF" else plain
+    if wanted is not None and scene.arto.use_in_compositor == "RENDER":
+        _take_over(scene, tree, wanted)
+
+
+def _take_over(scene: bpy.types.Scene, tree: Any, node: Any) -> None:
+    """Link to a node what the render of the scene's view layer is linked to."""
+    taken = []
+    layer = layer_of(scene)
+    for render in tree.nodes:
+        if render.bl_idname != "CompositorNodeRLayers" or render.scene not in {scene, None}:
+            continue
+        if render.layer != layer:
+            continue
+        for out in ("Image", "Alpha"):
+            # all of them first: a link that is replaced is gone
+            for to, socket in [(n.to_node, n.to_socket) for n in render.outputs[out].links]:
+                taken.append([render.name, out, to.name, socket.identifier])
+                tree.links.new(node.outputs[out], socket)
+    node[TAKEN] = json.dumps(taken)
+
+
+def _give_back(tree: Any, node: Any) -> None:
+    """Put back what a node took over, where the artist has not linked it otherwise since."""
+    for render, out, to, identifier in json.loads(node.get(TAKEN, "[]")):
+        if render not in tree.nodes or to not in tree.nodes:
+            continue
+        sockets = [s for s in tree.nodes[to].inputs if s.identifier == identifier]
+        for socket in sockets:
+            if any(link.from_node == node for link in socket.links):
+                tree.links.new(tree.nodes[render].outputs[out], socket)
+    if TAKEN in node:
+        del node[TAKEN]

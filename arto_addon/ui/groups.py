@@ -80,6 +80,7 @@ class ARTO_PT_layers(Panel, bpy.types.Panel):
             column.prop(settings, "layers_half")
             column.operator("arto.mix_to_scene", icon="WORLD_DATA")
         column.prop(settings, "footage")
+        column.prop(settings, "use_in_compositor")
 
 
 CLASSES = (ARTO_UL_groups, ARTO_OT_add_group, ARTO_OT_remove_group, ARTO_PT_layers)

@@ -18,6 +18,7 @@ from bpy.props import (
 from ...core.choice import CHOICES
 from ...core.hemicube import FACE_NAMES, PRESETS
 from ...core.patterns import PATTERN_SETS
+from ..relight.present import use
 
 _PATTERN_TEXT = {
     "moments": ("1, u, u², v, v²", "Five patterns that identify a box"),
@@ -51,6 +52,10 @@ def _preset_chosen(self: ArtoSettings, context: bpy.types.Context) -> None:
         if self.preset == "paper":
             # half a side cannot be split in four
             self["adaptive"] = False
+
+
+def _use_chosen(self: ArtoSettings, context: bpy.types.Context) -> None:
+    use(self.id_data)
 
 
 class ArtoGroup(bpy.types.PropertyGroup):
@@ -277,6 +282,20 @@ class ArtoSettings(bpy.types.PropertyGroup):
         subtype="DIR_PATH",
         default="//arto/",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    use_in_compositor: EnumProperty(
+        name="Use in Compositor",
+        description="Where the scene's compositor has the relit picture",
+        items=[
+            ("VIEWER", "In a Viewer", "A node beside yours, seen through a viewer"),
+            (
+                "RENDER",
+                "Instead of the Render",
+                "What hangs on the render hangs on it; In a Viewer puts it back",
+            ),
+        ],
+        default="VIEWER",
+        update=_use_chosen,
     )
     footage: PointerProperty(
         type=bpy.types.Image,

@@ -263,3 +263,35 @@ def test_a_mix_goes_back_to_the_scene(tmp_path):
 
 def relit_alpha(scene):
     return exr.read(paths.relit_file(scene))[""][..., 3:]
+
+
+def test_instead_of_the_render_and_back(lit):
+    """What hung on the render hangs on the plate, or on the mixer where there are layers; back, it
+    hangs where it did, but for what the artist has linked otherwise since."""
+    tree = bpy.data.node_groups.new("Mine", "CompositorNodeTree")
+    tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+    render, out = tree.nodes.new("CompositorNodeRLayers"), tree.nodes.new("NodeGroupOutput")
+    blur, glare = tree.nodes.new("CompositorNodeBlur"), tree.nodes.new("CompositorNodeGlare")
+    render.scene = lit
+    tree.links.new(render.outputs["Image"], blur.inputs["Image"])
+    tree.links.new(render.outputs["Image"], glare.inputs["Image"])
+    tree.links.new(blur.outputs["Image"], out.inputs[0])
+    lit.compositing_node_group = tree
+
+    def comes_from(node):
+        return node.inputs["Image"].links[0].from_node
+
+    relit(lit)
+    assert comes_from(blur) == render and comes_from(glare) == render
+    lit.arto.use_in_compositor = "RENDER"
+    assert comes_from(blur).node_tree.name == "ARTO Relit Mix" == comes_from(glare).node_tree.name
+    relit(lit)
+    assert comes_from(blur).node_tree.name == "ARTO Relit Mix"
+    lit.arto.layers = "OFF"
+    work.run(relight.relight(lit))
+    assert comes_from(blur).node_tree.name == "ARTO Relit"
+    # the artist takes one of them away
+    tree.links.remove(glare.inputs["Image"].links[0])
+    lit.arto.use_in_compositor = "VIEWER"
+    assert comes_from(blur) == render and not glare.inputs["Image"].links
+    assert comes_from(out.inputs[0].links[0].from_node) == render
