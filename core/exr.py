@@ -31,6 +31,7 @@ COLOUR_SPACES = {
     "Linear Rec.709": "lin_rec709_scene",
     "Linear Rec.2020": "lin_rec2020_scene",
     "ACEScg": "lin_ap1_scene",
+    "Non-Color": "data",
 }
 
 
@@ -257,13 +258,16 @@ def write(
     layers: dict[str, NDArray],
     attributes: dict[str, Any] | None = None,
     colour_space: str = "Linear Rec.709",
+    channels: dict[str, str] | None = None,
 ) -> None:
     """Write layers, (H, W, 3), (H, W, 4) or (H, W), each as a part of its own; ZIP, as they are.
 
-    A single layer named '' makes an ordinary one-part image. The file appears whole or not at
-    all. Raises ExrError if the folder cannot be written or the disk is full.
+    channels: the letters of a layer's channels, where they are not R, G, B, A or Y. A single layer
+    named '' makes an ordinary one-part image. The file appears whole or not at all. Raises ExrError
+    if the folder cannot be written or the disk is full.
     """
-    parts = [(name, _channels(pixels)) for name, pixels in layers.items()]
+    letters = channels or {}
+    parts = [(name, _channels(pixels, letters.get(name))) for name, pixels in layers.items()]
     _write(path, parts, attributes, colour_space)
 
 
@@ -285,13 +289,13 @@ def write_layered(
     _write(path, [("", channels)], attributes, colour_space)
 
 
-def _channels(pixels: NDArray) -> dict[str, NDArray]:
+def _channels(pixels: NDArray, letters: str | None = None) -> dict[str, NDArray]:
     """An image's planes by the names of its channels."""
     pixels = np.asarray(pixels)
     if pixels.dtype != np.float16:
         pixels = pixels.astype(np.float32, copy=False)
     planes = pixels[..., None] if pixels.ndim == 2 else pixels
-    names = {1: "Y", 3: "RGB", 4: "RGBA"}[planes.shape[-1]]
+    names = letters or {1: "Y", 3: "RGB", 4: "RGBA"}[planes.shape[-1]]
     return {c: np.ascontiguousarray(planes[..., i]) for i, c in enumerate(names)}
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core import exr
+from ...core.field import Field
 from ..shot import paths
 from .header import header
 
@@ -44,6 +45,22 @@ def share_file(path: Path) -> Path:
 def layers_file(path: Path) -> Path:
     """Beside a plate: what each part of its light gives to it."""
     return path.with_name(f"{path.stem}_layers.exr")
+
+
+def data_file(path: Path) -> Path:
+    """Beside a plate: what a denoiser or a compositor knows a picture by."""
+    return path.with_name(f"{path.stem}_data.exr")
+
+
+# Of the layers of that file, the letters of their channels.
+DATA = {"albedo": "RGB", "normal": "XYZ", "depth": "Z"}
+
+
+def write_data(path: Path, field: Field, attributes: dict[str, Any]) -> None:
+    """Write what a field knows of a plate beside its light, as 32-bit floats, a part each."""
+    found = {name: field.layer(name) for name in DATA if field.has_layer(name)}
+    if found:
+        exr.write(data_file(path), found, attributes, "Non-Color", DATA)
 
 
 def comp_file(path: Path) -> Path:

@@ -277,6 +277,7 @@ def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> S
         yield Progress(0.9, f"glass: {glass}")
     about |= {
         "look": lit.look,
+        "turn": f"{math.degrees(ready.whole.turn):.4g}" if ready.whole.turn else "",
         "world by rays": ready.by_rays,
         "changed since capture": "; ".join(ready.changed),
     }
@@ -289,6 +290,8 @@ def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> S
     if caught:
         plate.write(scene, plate.share_file(path), caught.share, about)
         yield from _into_footage(shown, caught, path, about)
+    if settings.write_data:
+        plate.write_data(path, shown.field, plate.header_of(scene, about)[0])
     if settings.layers != "OFF":
         found = yield from layers.of_plate(shown, ready)
         if not scene.render.film_transparent:

@@ -283,6 +283,11 @@ class ArtoSettings(bpy.types.PropertyGroup):
         default="//arto/",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
+    write_data: BoolProperty(
+        name="Write Data",
+        description="Write albedo, normals and depth beside the picture, as 32-bit floats",
+        default=False,
+    )
     use_in_compositor: EnumProperty(
         name="Use in Compositor",
         description="Where the scene's compositor has the relit picture",
@@ -345,7 +350,7 @@ CAPTURE = (
 FIT = ("support", "separate")
 RELIGHT = (
     "own_lamps", "lamps", "lamp_samples", "denoise", "environment_width", "look", "output",
-    "layers", "layer_prefix", "layers_half",
+    "layers", "layer_prefix", "layers_half", "write_data",
 )  # fmt: skip
 
 CLASSES = (ArtoGroup, ArtoSettings)

@@ -13,6 +13,7 @@ from arto.arto_addon.capture import capture
 from arto.arto_addon.capture.sequence import capture_frames
 from arto.arto_addon.farm.plan import plan
 from arto.arto_addon.relight import plate, relight
+from arto.arto_addon.relight.footage import footage
 from arto.arto_addon.relight.many import relight_many
 from arto.arto_addon.shot import paths
 from arto.arto_addon.stage.stage import stage
@@ -347,3 +348,31 @@ def test_farms_refuse_catchers(tmp_path):
     with pytest.raises(FarmError, match="one machine"):
         work.run(plan(scene, scene.view_layers[0].name, tmp_path / "job", [1], None, 1))
     assert scene.objects["Floor"].is_shadow_catcher
+
+
+@pytest.mark.parametrize("kind", ["sequence", "clip"])
+def test_footage_of_the_frame(tmp_path, kind):
+    """A sequence or a movie clip behind the camera shows the scene's frame."""
+    scene = with_catcher(tmp_path, samples=4, patches=1)
+    for frame, grey in ((1, 0.2), (2, 0.6)):
+        image = bpy.data.images.new(f"Frame{frame}", 24, 18)
+        image.pixels.foreach_set(np.tile(np.float32([grey, grey, grey, 1]), 24 * 18))
+        image.filepath_raw = str(tmp_path / f"filmed_{frame:04d}.png")
+        image.file_format = "PNG"
+        image.save()
+    camera = scene.camera.data
+    camera.show_background_images = True
+    behind = camera.background_images.new()
+    first = str(tmp_path / "filmed_0001.png")
+    if kind == "sequence":
+        behind.image = bpy.data.images.load(first)
+        behind.image.source = "SEQUENCE"
+        behind.image_user.frame_duration, behind.image_user.frame_start = 2, 1
+    else:
+        behind.source, behind.clip = "MOVIE_CLIP", bpy.data.movieclips.load(first)
+    for frame, grey in ((1, 0.2), (2, 0.6)):
+        scene.frame_set(frame)
+        found = footage(scene).read(scene)
+        encoded = round(grey * 255) / 255
+        linear = ((encoded + 0.055) / 1.055) ** 2.4
+        np.testing.assert_allclose(found, linear, atol=2e-3)

@@ -6,7 +6,7 @@ import math
 
 import bpy
 import numpy as np
-import OpenEXR
+import OpenImageIO
 import pytest
 from arto.arto_addon import work
 from arto.arto_addon.blender.output import float_exr
@@ -123,21 +123,34 @@ def test_the_world_behind_is_a_layer(lit):
     assert 0.05 < clear.mean() < 0.95
 
 
-def test_half_floats_and_header(lit):
-    """As compositing programs want them; read by a reader that knows nothing of ARTO."""
-    lit.arto.layers_half, lit.arto.layer_prefix = True, "C_"
-    relit_path, _ = work.run(relight.relight(lit))
-    file = OpenEXR.File(str(plate.layers_file(relit_path)), separate_channels=True)
-    (part,) = file.parts
-    assert part.header["colorInteropID"] == "lin_rec709_scene"
-    assert "chromaticities" not in part.header
-    names = list(part.channels)
-    assert {"R", "G", "B", "A", "C_top.R", "C_own.B"} <= set(names)
-    assert all(c.pixels.dtype == np.float16 for c in part.channels.values())
-    for c in "RGB":
-        layers = [part.channels[n].pixels.astype(float) for n in names if n.endswith(f".{c}")]
-        whole = part.channels[c].pixels.astype(float)
-        assert np.abs(sum(layers) - whole).max() < 2e-3 * whole.max()
+def test_a_reader_that_knows_nothing_of_arto(lit):
+    """OpenImageIO finds one part of half floats, plain R, G, B, A first, and what the layers of
+    each channel add up to; the data as parts of their own."""
+    lit.arto.layers_half, lit.arto.layer_prefix, lit.arto.write_data = True, "C_", True
+    path, _ = work.run(relight.relight(lit))
+    file = OpenImageIO.ImageInput.open(str(plate.layers_file(path)))
+    spec = file.spec()
+    assert spec.channelnames[:4] == ("R", "G", "B", "A") and spec.format == "half"
+    assert {"C_top.R", "C_own.B"} <= set(spec.channelnames)
+    assert spec["colorInteropID"] == "lin_rec709_scene" and spec.getattribute("chromaticities") is None
+    assert spec["compression"] == "zip"
+    pixels = file.read_image("float")
+    for i, c in enumerate("RGB"):
+        mine = [n for n, name in enumerate(spec.channelnames) if name.endswith(f".{c}")]
+        whole = pixels[..., i]
+        assert np.abs(pixels[..., mine].sum(axis=-1) - whole).max() < 2e-3 * whole.max()
+    assert not file.seek_subimage(1, 0)
+    data = OpenImageIO.ImageInput.open(str(plate.data_file(path)))
+    found = {}
+    while data.seek_subimage(len(found), 0):
+        spec = data.spec()
+        found[spec["oiio:subimagename"]] = spec.channelnames
+        assert spec.format == "float" and spec["colorInteropID"] == "data"
+    assert found == {
+        "albedo": ("R", "G", "B"),
+        "normal": ("X", "Y", "Z"),
+        "depth": ("Z",),
+    }
 
 
 def test_the_mixer_in_the_compositor(lit, tmp_path):
