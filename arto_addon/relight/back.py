@@ -70,11 +70,11 @@ def mix_to_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> Path:
     layer = view_layer or layer_of(scene)
     mix, settings = mix_of(scene), scene.arto
     shown = Shown(scene, layer)
-    check_world(scene, layer)
+    world = check_world(scene, layer)
     whole = kept.environment(scene, settings.environment_width, layer)
     image = np.zeros_like(whole.image)
     left = np.ones(whole.image.shape[:2], np.float32)
-    for name, share in layers.parts_of(scene, whole, shown.field).items():
+    for name, share in layers.parts_of(scene, whole, shown.field, world).items():
         gain = mix.of(f"{settings.layer_prefix}{layers.layer_name(name)}")
         image += part_of(whole, share).image * gain.astype(np.float32)
         left -= share

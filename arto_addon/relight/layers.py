@@ -22,6 +22,7 @@ from ...core.light import PatchLight
 from ...core.relight import relights, together
 from ...core.shot import safe_name
 from ..work import Progress, Steps
+from ..world import kept
 from ..world.lamp_render import lamp_light
 from . import denoise
 from .plate import layers_file
@@ -48,19 +49,26 @@ def _check(groups: Any) -> None:
 
 
 def parts_of(
-    scene: bpy.types.Scene, environment: Environment, field: Field
+    scene: bpy.types.Scene, environment: Environment, field: Field, world: bpy.types.World
 ) -> dict[str, NDArray[np.float32]]:
-    """The shares (H, W) of an environment that the artist's settings cut it into; they sum to 1."""
+    """The shares (H, W) of an environment that the artist's settings cut it into; they sum to 1.
+
+    world: that it is of, for masks that are painted on its HDRI.
+    """
     settings = scene.arto
     if settings.layers == "FACES":
         found = by_faces(environment, field.hemicube)
         # light from where no face is lights nothing: no layer has it
         return {k: v for k, v in found.items() if v.any()}
     _check(settings.groups)
-    masks = {
-        group.name: disc(environment, group.azimuth, group.elevation, group.radius, group.soft)
-        for group in settings.groups
-    }
+    masks = {}
+    for group in settings.groups:
+        if group.mask:
+            width = environment.image.shape[1]
+            masks[group.name] = kept.painted(scene, group.mask, width, world)
+            continue
+        place = group.azimuth, group.elevation, group.radius
+        masks[group.name] = disc(environment, *place, group.soft)
     if not masks:
         return {"light": np.ones(environment.image.shape[:2], np.float32)}
     return shares(masks)
@@ -93,7 +101,7 @@ def of_plate(shot: Shown, ready: Ready) -> Steps:
     """The layers of a plate, (H, W, 3) each, by name, denoised where the plate is; of a shot with
     shadow catchers, of its things alone."""
     shown, rendered = shot.takes[-1], ready.rendered[-1]
-    parts = parts_of(shown.scene, ready.whole, shown.field)
+    parts = parts_of(shown.scene, ready.whole, shown.field, ready.world)
     scene, field = shown.scene, shown.field
     yield Progress(0.9, f"relighting {len(parts)} layers")
     rest = ready.found.rest if rendered else ready.whole

@@ -73,8 +73,10 @@ class ARTO_PT_layers(Panel, bpy.types.Panel):
             buttons.operator("arto.remove_group", text="", icon="REMOVE")
             if 0 <= settings.active_group < len(settings.groups):
                 group = settings.groups[settings.active_group]
-                for name in ("azimuth", "elevation", "radius", "soft"):
-                    column.prop(group, name)
+                column.prop(group, "mask")
+                if not group.mask:
+                    for name in ("azimuth", "elevation", "radius", "soft"):
+                        column.prop(group, name)
         if settings.layers != "OFF":
             column.prop(settings, "layer_prefix")
             column.prop(settings, "layers_half")

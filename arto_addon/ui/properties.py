@@ -61,6 +61,12 @@ def _use_chosen(self: ArtoSettings, context: bpy.types.Context) -> None:
 class ArtoGroup(bpy.types.PropertyGroup):
     """A part of the world's light that gets a layer of its own. Its name is the layer's."""
 
+    mask: PointerProperty(
+        type=bpy.types.Image,
+        name="Painted",
+        description="An image of the HDRI's shape: where it is white, the light is in this group. "
+        "Empty: a round part of the light",
+    )
     azimuth: FloatProperty(
         name="Azimuth",
         description="Where its middle is, counterclockwise from +X as seen from above",

@@ -20,6 +20,7 @@ import bpy
 import numpy as np
 
 from ...core.environment import Environment
+from ...core.errors import SceneError
 from ...core.files import whole
 from ..blender.nodes import trees
 from ..shot import paths
@@ -61,6 +62,31 @@ def environment(
     if image.nbytes <= LAST:
         _last.update(key=(path, strength), image=image)
     return Environment(image, turn)
+
+
+def painted(
+    scene: bpy.types.Scene, mask: bpy.types.Image, width: int, world: bpy.types.World
+) -> np.ndarray:
+    """How white each texel of a world's `environment` was painted on its HDRI, (width / 2, width),
+    from 0 to 1.
+
+    mask: an image that lies on the HDRI as that lies on the sky. Raises SceneError where the world
+    has not one HDRI alone.
+    """
+    with _without_dials(world) as (plain, _, _):
+        found = [n for t in trees(plain.node_tree, set()) for n in t.nodes]
+        textures = [n for n in found if n.bl_idname == "ShaderNodeTexEnvironment" and n.image]
+        if len(textures) != 1 or textures[0].id_data != plain.node_tree:
+            raise SceneError(
+                f"'{mask.name}' is painted on an HDRI, and the world has {len(textures)} (or it is "
+                "in a node group): give the group an azimuth, elevation and radius instead"
+            )
+        texture, tree = textures[0], plain.node_tree
+        texture.image = mask
+        light = tree.nodes.new("ShaderNodeBackground")
+        tree.links.new(texture.outputs["Color"], light.inputs["Color"])
+        tree.links.new(light.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
+        return np.clip(bake(scene, width, None, plain).image.mean(axis=-1), 0, 1)
 
 
 def _read(path: Path, width: int) -> np.ndarray | None:

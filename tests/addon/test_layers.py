@@ -81,6 +81,37 @@ def test_a_layer_is_the_picture_in_that_part_of_the_light(lit):
     assert np.abs(found["LG_key"] - alone).mean() < 0.03 * alone.mean()
 
 
+def test_a_group_that_is_painted_on_the_hdri(lit):
+    """Its layer is the plate in what is painted alone, turned as the HDRI is."""
+    image = smooth()
+    mask = np.zeros(image.shape[:2])
+    mask[8:24, 30:60] = 1
+    lit.arto.layers, lit.arto.own_lamps = "GROUPS", 0.0
+    white = bpy.data.images.new("Window", image.shape[1], image.shape[0], float_buffer=True)
+    white.colorspace_settings.name = "Non-Color"
+    rgba = np.dstack([mask, mask, mask, np.ones_like(mask)]).astype(np.float32)
+    white.pixels.foreach_set(rgba[::-1].ravel())
+    white.pack()
+    lit.arto.groups.add().name = "window"
+    lit.arto.groups[0].mask = white
+    lit.world = bpy.data.worlds.new("Sky")
+    hdri(lit, image, rotation=0.9)
+    picture, found = relit(lit)
+    np.testing.assert_allclose(sum(found.values()), picture[..., :3], rtol=1e-5, atol=1e-6)
+    lit.world = bpy.data.worlds.new("Painted")
+    hdri(lit, image * mask[..., None], rotation=0.9)
+    lit.arto.layers = "OFF"
+    path, _ = work.run(relight.relight(lit))
+    alone = exr.read(path)[""][..., :3]
+    assert alone.mean() > 0.01
+    assert np.abs(found["LG_window"] - alone).mean() < 0.03 * alone.mean()
+    # a world of no HDRI cannot be painted on
+    lit.world = bpy.data.worlds.new("Plain")
+    lit.arto.layers = "GROUPS"
+    with pytest.raises(SceneError, match="painted"):
+        relit(lit)
+
+
 def test_groups_need_names_of_their_own(lit):
     lit.arto.layers = "GROUPS"
     group_at(lit, "key.1", 0, 0.5, 0.3)
@@ -132,7 +163,9 @@ def test_a_reader_that_knows_nothing_of_arto(lit):
     spec = file.spec()
     assert spec.channelnames[:4] == ("R", "G", "B", "A") and spec.format == "half"
     assert {"C_top.R", "C_own.B"} <= set(spec.channelnames)
-    assert spec["colorInteropID"] == "lin_rec709_scene" and spec.getattribute("chromaticities") is None
+    assert (
+        spec["colorInteropID"] == "lin_rec709_scene" and spec.getattribute("chromaticities") is None
+    )
     assert spec["compression"] == "zip"
     pixels = file.read_image("float")
     for i, c in enumerate("RGB"):
