@@ -1,4 +1,5 @@
-"""Picture of the extension in Blender's window: `python -m tools.screenshot docs/panel.png`.
+"""Picture of the extension in Blender's window: `python -m tools.screenshot docs/panel.png`, or of
+a shot with a shadow catcher and layers: `python -m tools.screenshot --plate docs/mixer.png`.
 
 Builds the extension, installs it into a Blender of no person's own, captures, fits and relights the
 product shot at few samples, and shows panel, relit picture and compositor. Needs Linux, xvfb-run,
@@ -41,6 +42,28 @@ bpy.ops.wm.save_as_mainfile(filepath=sys.argv[-1])
 bpy.ops.arto.build_hemicube()
 bpy.ops.arto.capture()
 bpy.ops.arto.fit()
+bpy.ops.arto.relight()
+bpy.ops.wm.save_mainfile()
+"""
+
+PLATE = """
+import sys
+sys.path.insert(0, sys.argv[-2])
+import bpy
+from bench import scenes, worlds
+
+scene = scenes.four_spheres(width=400, height=300)
+scene.objects["floor"].is_shadow_catcher = scene.render.film_transparent = True
+worlds.set_world_hdri(scene, "sunset")
+bpy.ops.preferences.addon_enable(module="bl_ext.user_default.arto")
+settings = scene.arto
+settings.samples, settings.layers = 64, "GROUPS"
+for name, azimuth, elevation in (("key", 0.4, 0.5), ("fill", 2.6, 0.3)):
+    bpy.ops.arto.add_group()
+    group = settings.groups[-1]
+    group.name, group.azimuth, group.elevation = name, azimuth, elevation
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[-1])
+bpy.ops.arto.capture()
 bpy.ops.arto.relight()
 bpy.ops.wm.save_mainfile()
 """
@@ -135,7 +158,7 @@ def step():
 
 
 # every part of the panel open, whatever is the default
-for name in ("ARTO_PT_hemicube", "ARTO_PT_capture"):
+for name in sys.argv[-2].split(","):
     panel = getattr(bpy.types, name)
     bpy.utils.unregister_class(panel)
     panel.bl_options = set()
@@ -148,7 +171,10 @@ bpy.app.timers.register(step, first_interval=1.0)
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tools.screenshot")
     parser.add_argument("picture", type=Path, help="the PNG to write")
-    picture = parser.parse_args().picture.resolve()
+    parser.add_argument("--plate", action="store_true", help="a shadow catcher, and layers")
+    options = parser.parse_args()
+    picture, plate = options.picture.resolve(), options.plate
+    panels = "ARTO_PT_layers" if plate else "ARTO_PT_hemicube,ARTO_PT_capture"
     blender = shlex.split(os.environ.get("BLENDER", ""))
     if not blender:
         print("screenshot: BLENDER is not set, the command line of Blender", file=sys.stderr)
@@ -167,12 +193,12 @@ def main() -> int:
 
         install = ("--command", "extension", "install-file", "-r", "user_default", "--enable")
         run(*blender, *install, zipped)
-        (folder / "work.py").write_text(WORK)
+        (folder / "work.py").write_text(PLATE if plate else WORK)
         (folder / "show.py").write_text(SHOW)
         scene, work, shot = folder / "product.blend", folder / "work.py", folder / "shot.png"
         run(*blender, "-b", "--python-exit-code", "1", "--python", work, "--", package.ROOT, scene)
         window = ("-p", "0", "0", str(width), str(height))
-        run(*display, *blender, *window, scene, "--python", folder / "show.py", "--", shot)
+        run(*display, *blender, *window, scene, "--python", folder / "show.py", "--", panels, shot)
         if not shot.is_file():
             print("screenshot: Blender took no picture", file=sys.stderr)
             return 1

@@ -88,7 +88,9 @@ def wire(scene: bpy.types.Scene, group: Any) -> Any:
         None,
     )
     if node is None:
-        below = min((n.location.y - max(n.height, 200) for n in tree.nodes), default=0.0)
+        # Blender knows no node's height before it is drawn
+        tall = {n.name: 80 + 24 * (len(n.inputs) + len(n.outputs)) for n in tree.nodes}
+        below = min((n.location.y - max(n.height, tall[n.name]) for n in tree.nodes), default=0.0)
         node = tree.nodes.new("CompositorNodeGroup")
         node.node_tree = group
         node.label = group.name
