@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from .environment import Environment, directions, sample_directions
 from .hemicube import Hemicube
+from .patterns import MONOMIALS, monomials
 
 # Samples of a map that are worked on at a time, and of one whose bins are kept.
 BLOCK = 1 << 20
 KEPT = 1 << 22
 _KEPT: dict[tuple, list[Samples]] = {}
+_MONOMIALS: dict[tuple, NDArray[np.float64]] = {}
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,11 @@ class Samples:
         lit = self.bins.ravel() >= 0
         index = self.bins.ravel()[lit].astype(np.intp)
         return index, np.repeat(self.weight, self.bins.shape[1])[lit]
+
+    @cached_property
+    def solid_angles(self) -> NDArray[np.float64]:
+        """Of each bin up to the last that has samples here, (n,), what they sum to."""
+        return np.bincount(*self.lit)
 
 
 def default_resolution(hemicube: Hemicube, environment: Environment) -> NDArray[np.intp]:
@@ -90,6 +97,37 @@ def sample_bins(
             yield block
     if keep is not None:
         _KEPT[key] = keep
+
+
+def bin_centres(hemicube: Hemicube, k: int, resolution: int) -> tuple[NDArray, NDArray]:
+    """Patch coordinates of a patch's bins' centres along u and along v -> (r,), (r,)."""
+    x = hemicube.extents[k]
+    mid = (np.arange(resolution) + 0.5) / resolution
+    out = []
+    for low, high in ((x[0], x[1]), (x[2], x[3])):
+        angle = np.arctan(low) + (np.arctan(high) - np.arctan(low)) * mid
+        out.append((np.tan(angle) - low) / (high - low))
+    return out[0], out[1]
+
+
+def bin_monomials(hemicube: Hemicube, resolutions: NDArray) -> NDArray[np.float64] | None:
+    """The monomials at the centres of all patches' bins, (6, bins), patch by patch and row by row.
+
+    The same for every map of a size, so those of the last one are kept. None where they are many.
+    """
+    if len(MONOMIALS) * int((resolutions**2).sum()) > KEPT:
+        return None
+    key = (hemicube, resolutions.tobytes())
+    found = _MONOMIALS.get(key)
+    if found is None:
+        parts = []
+        for k, r in enumerate(resolutions.tolist()):
+            u, v = bin_centres(hemicube, k, r)
+            parts.append(monomials(u[None, :], v[:, None]).reshape(len(MONOMIALS), -1))
+        found = np.concatenate(parts, axis=1)
+        _MONOMIALS.clear()
+        _MONOMIALS[key] = found
+    return found
 
 
 def bin_coordinate(

@@ -13,7 +13,14 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
-from .bins import Samples, bin_coordinate, default_resolution, sample_bins
+from .bins import (
+    Samples,
+    bin_centres,
+    bin_coordinate,
+    bin_monomials,
+    default_resolution,
+    sample_bins,
+)
 from .environment import Environment
 from .hemicube import Hemicube
 from .patterns import monomials
@@ -45,11 +52,20 @@ class PatchLight:
         self._fill_empty(environment)
         self._lock = Lock()
         self._polynomials: dict[tuple[int, ...], NDArray[np.float64]] = {}
-        self._sat = np.zeros((int(self._tables[-1]), 4))
-        for k, r in enumerate(self.resolutions):
-            table = self._sat[self._tables[k] : self._tables[k + 1]].reshape(r + 1, r + 1, 4)
-            np.cumsum(self.bins_of(k), axis=0, out=table[1:, 1:])
-            np.cumsum(table[1:, 1:], axis=1, out=table[1:, 1:])
+        self._sums: NDArray[np.float64] | None = None
+
+    @property
+    def _sat(self) -> NDArray[np.float64]:
+        """The tables of sums, of which only boxes ask; worked out for the first one."""
+        with self._lock:  # threads that relight come here at once
+            if self._sums is None:
+                sums = np.zeros((int(self._tables[-1]), 4))
+                for k, r in enumerate(self.resolutions):
+                    table = sums[self._tables[k] : self._tables[k + 1]].reshape(r + 1, r + 1, 4)
+                    np.cumsum(self.bins_of(k), axis=0, out=table[1:, 1:])
+                    np.cumsum(table[1:, 1:], axis=1, out=table[1:, 1:])
+                self._sums = sums
+            return self._sums
 
     def _collect(self, texels: NDArray, some: Samples, turn: float) -> None:
         """Add some rows of the map, turned, to the bins."""
@@ -62,7 +78,10 @@ class PatchLight:
             else:
                 self._flat[:, c] += np.bincount(index, values, len(self._flat))
 
-        add(3, solid_angle)
+        if few:
+            add(3, solid_angle)
+        else:
+            self._flat[: len(some.solid_angles), 3] += some.solid_angles
         everywhere = len(index) == some.bins.size
         for c in range(3):
             samples = np.repeat(texels[..., c], some.finer, axis=0)
@@ -103,18 +122,12 @@ class PatchLight:
     @cached_property
     def whole(self) -> NDArray[np.float64]:
         """(K, 3): average radiance of each patch."""
-        total = self._sat[self._tables[1:] - 1]
+        total = np.add.reduceat(self._flat, self._offsets[:-1])
         return total[:, :3] / total[:, 3:]
 
     def bin_centres(self, k: int) -> tuple[NDArray, NDArray]:
         """Patch coordinates of the bins' centres along u and along v -> (r,), (r,)."""
-        x = self.hemicube.extents[k]
-        mid = (np.arange(self.resolutions[k]) + 0.5) / self.resolutions[k]
-        out = []
-        for low, high in ((x[0], x[1]), (x[2], x[3])):
-            angle = np.arctan(low) + (np.arctan(high) - np.arctan(low)) * mid
-            out.append((np.tan(angle) - low) / (high - low))
-        return out[0], out[1]
+        return bin_centres(self.hemicube, k, int(self.resolutions[k]))
 
     def polynomial(self, which: tuple[int, ...]) -> NDArray[np.float64]:
         """The polynomial in u, v nearest to each patch's light, by solid angle.
@@ -125,11 +138,16 @@ class PatchLight:
         with self._lock:  # threads that relight come here at once
             if which in self._polynomials:
                 return self._polynomials[which]
+            every = bin_monomials(self.hemicube, self.resolutions)
             out = np.empty((len(self.hemicube), len(which), 3))
             for k in range(len(self.hemicube)):
-                u, v = self.bin_centres(k)
-                m = monomials(u[None, :], v[:, None])[list(which)].reshape(len(which), -1)
-                light = self.bins_of(k).reshape(-1, 4)
+                some = slice(self._offsets[k], self._offsets[k + 1])
+                if every is None:
+                    u, v = self.bin_centres(k)
+                    m = monomials(u[None, :], v[:, None])[list(which)].reshape(len(which), -1)
+                else:
+                    m = every[list(which), some]
+                light = self._flat[some]
                 gram = (m * light[:, 3]) @ m.T
                 out[k] = np.linalg.solve(gram, m @ light[:, :3])
             self._polynomials[which] = out
