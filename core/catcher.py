@@ -28,12 +28,14 @@ class Caught:
     """What things do to a picture that they are put into. All (H, W, ...), scene-linear.
 
     colour: (..., 3), the things by themselves, premultiplied by `alpha` (H, W), their coverage;
-    share: (..., 3), how much of what is behind is seen, in their shadows and under them.
+    share: (..., 3), how much of what is behind is seen, in their shadows and under them; light:
+    (..., 3), what of light they add to the ground that is seen, or take from it, below 0.
     """
 
     colour: NDArray[np.float32]
     alpha: NDArray[np.float32]
     share: NDArray[np.float32]
+    light: NDArray[np.float32]
 
     @property
     def plate(self) -> NDArray[np.float32]:
@@ -44,6 +46,12 @@ class Caught:
     def over(self, footage: NDArray) -> NDArray[np.float32]:
         """The things in the footage (H, W, 3), as Cycles' shadow catcher pass multiplies it."""
         return (self.colour + self.share * footage).astype(np.float32)
+
+    def added_to(self, footage: NDArray) -> NDArray[np.float32]:
+        """The things in the footage (H, W, 3), their shadows as the light that they take from the
+        ground as it was modelled: right where footage and ground are alike (Debevec 1998)."""
+        seen = (1 - self.alpha)[..., None]
+        return np.maximum(self.colour + seen * footage + self.light, 0).astype(np.float32)
 
 
 def catch(whole: NDArray, ground: NDArray, things: NDArray, there: NDArray | None = None) -> Caught:
@@ -63,7 +71,8 @@ def catch(whole: NDArray, ground: NDArray, things: NDArray, there: NDArray | Non
     ratio = spread(ratio, trusted if there is None else trusted * (there > 0)[..., None])
     covered = 1.0 if there is None else there[..., None]
     share = seen * (1 + covered * (ratio - 1))
-    return Caught(*(part.astype(np.float32) for part in (colour, alpha, share)))
+    light = whole - colour - seen * ground
+    return Caught(*(part.astype(np.float32) for part in (colour, alpha, share, light)))
 
 
 def _median(ground: NDArray, there: NDArray | None) -> float:

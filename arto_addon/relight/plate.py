@@ -42,6 +42,11 @@ def share_file(path: Path) -> Path:
     return path.with_name(f"{path.stem}_catcher.exr")
 
 
+def light_file(path: Path) -> Path:
+    """Beside a plate with shadow catchers: the light that its things add to the ground."""
+    return path.with_name(f"{path.stem}_light.exr")
+
+
 def layers_file(path: Path) -> Path:
     """Beside a plate: what each part of its light gives to it."""
     return path.with_name(f"{path.stem}_layers.exr")

@@ -289,6 +289,8 @@ def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> S
     plate.write(scene, path, picture, about)
     if caught:
         plate.write(scene, plate.share_file(path), caught.share, about)
+        if settings.shadows == "ADD":
+            plate.write(scene, plate.light_file(path), caught.light, about)
         yield from _into_footage(shown, caught, path, about)
     if settings.write_data:
         plate.write_data(path, shown.field, plate.header_of(scene, about)[0])
@@ -328,7 +330,9 @@ def _into_footage(
     if found is None:
         return
     yield Progress(0.9, f"putting it into the footage: {found.name}")
-    comp = caught.over(found.read(shown.scene))
+    there = found.read(shown.scene)
+    adds = shown.scene.arto.shadows == "ADD"
+    comp = caught.added_to(there) if adds else caught.over(there)
     plate.write(shown.scene, plate.comp_file(path), comp, about | {"footage": found.name})
 
 

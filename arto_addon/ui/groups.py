@@ -83,6 +83,7 @@ class ARTO_PT_layers(Panel, bpy.types.Panel):
             column.operator("arto.mix_to_scene", icon="WORLD_DATA")
         column.prop(settings, "write_data")
         column.prop(settings, "footage")
+        column.prop(settings, "shadows")
         column.prop(settings, "use_in_compositor")
 
 

@@ -294,6 +294,20 @@ class ArtoSettings(bpy.types.PropertyGroup):
         description="Write albedo, normals and depth beside the picture, as 32-bit floats",
         default=False,
     )
+    shadows: EnumProperty(
+        name="Shadows",
+        description="How the things of a shot with shadow catchers go into footage",
+        items=[
+            ("MULTIPLY", "Multiply", "As Cycles: the footage times what is left of its light"),
+            (
+                "ADD",
+                "Add Light",
+                "The footage, and the light that the things add to the ground as "
+                "it was modelled or take from it: for a ground that looks like what was filmed",
+            ),
+        ],
+        default="MULTIPLY",
+    )
     use_in_compositor: EnumProperty(
         name="Use in Compositor",
         description="Where the scene's compositor has the relit picture",
@@ -356,7 +370,7 @@ CAPTURE = (
 FIT = ("support", "separate")
 RELIGHT = (
     "own_lamps", "lamps", "lamp_samples", "denoise", "environment_width", "look", "output",
-    "layers", "layer_prefix", "layers_half", "write_data",
+    "layers", "layer_prefix", "layers_half", "write_data", "shadows",
 )  # fmt: skip
 
 CLASSES = (ArtoGroup, ArtoSettings)

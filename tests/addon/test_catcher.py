@@ -17,9 +17,11 @@ from arto.arto_addon.relight.footage import footage
 from arto.arto_addon.relight.many import relight_many
 from arto.arto_addon.shot import paths
 from arto.arto_addon.stage.stage import stage
+from arto.arto_addon.world import kept
 from arto.core import exr
 from arto.core.errors import CancelledError, FarmError, FieldError, SceneError
 from arto.core.field import Field
+from arto.core.light import PatchLight
 from scene_tools import BOX, add_mesh, captured, differences, set_colour, small_scene, snapshot
 from test_checks import instance_of
 from test_world import hdri, smooth
@@ -376,3 +378,23 @@ def test_footage_of_the_frame(tmp_path, kind):
         encoded = round(grey * 255) / 255
         linear = ((encoded + 0.055) / 1.055) ** 2.4
         np.testing.assert_allclose(found, linear, atol=2e-3)
+
+
+def test_light_can_be_added_instead(tmp_path):
+    """Over the ground itself, as ARTO shows it alone, the comp is the picture of all."""
+    scene = with_catcher(tmp_path, samples=16, patches=1)
+    captured(scene)
+    path, _ = work.run(relight.relight(scene))
+    shown = relight.Shown(scene, scene.view_layers[0].name)
+    light = PatchLight(kept.environment(scene, scene.arto.environment_width), shown.field.hemicube)
+    whole, ground, _ = shown.pictures([light])[0]
+    grey = bpy.data.images.new("Ground", 24, 18, float_buffer=True)
+    grey.colorspace_settings.name = bpy.data.colorspace.working_space
+    rgba = np.dstack([ground[..., :3], np.ones(ground.shape[:2])]).astype(np.float32)
+    grey.pixels.foreach_set(rgba[::-1].ravel())
+    grey.pack()
+    scene.arto.footage, scene.arto.shadows = grey, "ADD"
+    relit(scene)
+    comp = exr.read(plate.comp_file(path))[""]
+    np.testing.assert_allclose(comp, whole[..., :3], atol=2e-3)
+    assert plate.light_file(path).is_file()

@@ -124,3 +124,19 @@ def test_spread_is_smooth_and_keeps_what_is_known(rng):
     np.testing.assert_allclose(
         spread(plane, one[..., None]), np.broadcast_to(plane[5, 7], plane.shape)
     )
+
+
+def test_over_the_ground_itself_both_ways_are_the_whole_picture(rng):
+    """Footage that is the ground as it was modelled gives the picture of both: exactly where the
+    things' light on it is added; without things it passes."""
+    ground, shadow = ground_of(rng)
+    things = disc()
+    apart = plate(things, (0.5, 0.2, 0.9))
+    whole = apart[..., :3] + (1 - things)[..., None] * shadow * ground
+    found = catch(whole, ground, apart)
+    np.testing.assert_allclose(found.added_to(ground), whole, atol=1e-6)
+    bare = things == 0
+    np.testing.assert_allclose(found.over(ground)[bare], whole[bare], atol=2e-3)
+    nothing = catch(ground, ground, NOTHING)
+    footage = rng.uniform(size=(*SIZE, 3)).astype(np.float32)
+    np.testing.assert_array_equal(nothing.added_to(footage), footage)
