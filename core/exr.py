@@ -93,6 +93,14 @@ def _telling(path: Path) -> Iterator[None]:
         raise ExrError(f"{path} is truncated or damaged, {e}: make it again") from None
 
 
+def whole_parts(path: Path) -> list[tuple[dict[str, Any], dict[str, NDArray]]]:
+    """The header and the channels by name of each part of a file. Raises ExrError."""
+    found = []
+    for part in _parts(path, header_only=False):
+        found.append((dict(part.header), {n: c.pixels for n, c in part.channels.items()}))
+    return found
+
+
 def part_names(path: Path) -> list[str]:
     """The names of the layers of a file as `parts` has them, without reading pixels."""
     found = [p.header for p in _parts(path, header_only=True)]
@@ -258,17 +266,26 @@ def write(
     layers: dict[str, NDArray],
     attributes: dict[str, Any] | None = None,
     colour_space: str = "Linear Rec.709",
-    channels: dict[str, str] | None = None,
 ) -> None:
     """Write layers, (H, W, 3), (H, W, 4) or (H, W), each as a part of its own; ZIP, as they are.
 
-    channels: the letters of a layer's channels, where they are not R, G, B, A or Y. A single layer
-    named '' makes an ordinary one-part image. The file appears whole or not at all. Raises ExrError
-    if the folder cannot be written or the disk is full.
+    A single layer named '' makes an ordinary one-part image. The file appears whole or not at all.
+    Raises ExrError if the folder cannot be written or the disk is full.
     """
-    letters = channels or {}
-    parts = [(name, _channels(pixels, letters.get(name))) for name, pixels in layers.items()]
+    parts = [(name, _channels(pixels)) for name, pixels in layers.items()]
     _write(path, parts, attributes, colour_space)
+
+
+def write_planes(
+    path: Path, parts: dict[str, dict[str, NDArray]], attributes: dict[str, Any]
+) -> None:
+    """Write data, planes (H, W) by the names of their channels in parts of theirs, as 32-bit
+    floats. Raises ExrError as `write`."""
+    planes = {
+        part: {name: np.ascontiguousarray(p, np.float32) for name, p in channels.items()}
+        for part, channels in parts.items()
+    }
+    _write(path, list(planes.items()), attributes, "Non-Color")
 
 
 def write_layered(
@@ -289,13 +306,13 @@ def write_layered(
     _write(path, [("", channels)], attributes, colour_space)
 
 
-def _channels(pixels: NDArray, letters: str | None = None) -> dict[str, NDArray]:
+def _channels(pixels: NDArray) -> dict[str, NDArray]:
     """An image's planes by the names of its channels."""
     pixels = np.asarray(pixels)
     if pixels.dtype != np.float16:
         pixels = pixels.astype(np.float32, copy=False)
     planes = pixels[..., None] if pixels.ndim == 2 else pixels
-    names = letters or {1: "Y", 3: "RGB", 4: "RGBA"}[planes.shape[-1]]
+    names = {1: "Y", 3: "RGB", 4: "RGBA"}[planes.shape[-1]]
     return {c: np.ascontiguousarray(planes[..., i]) for i, c in enumerate(names)}
 
 

@@ -9,9 +9,10 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core import exr
+from ...core import cryptomatte, exr
+from ...core.errors import SceneError
 from ...core.field import Field
-from ..shot import paths
+from ..shot import home, paths
 from .header import header
 
 IMAGE = "ARTO Relit"
@@ -61,11 +62,25 @@ def data_file(path: Path) -> Path:
 DATA = {"albedo": "RGB", "normal": "XYZ", "depth": "Z"}
 
 
-def write_data(path: Path, field: Field, attributes: dict[str, Any]) -> None:
-    """Write what a field knows of a plate beside its light, as 32-bit floats, a part each."""
-    found = {name: field.layer(name) for name in DATA if field.has_layer(name)}
-    if found:
-        exr.write(data_file(path), found, attributes, "Non-Color", DATA)
+def write_data(scene: bpy.types.Scene, path: Path, field: Field, about: dict[str, str]) -> None:
+    """Write what a field knows of a plate beside its light, as 32-bit floats, a part each; and the
+    Cryptomattes of the artist's own render, where the settings name it. Raises SceneError where
+    that is of another size; ExrError."""
+    parts: dict[str, dict[str, NDArray]] = {}
+    for name, letters in DATA.items():
+        if field.has_layer(name):
+            pixels = field.layer(name).reshape(*field.shape, -1)
+            parts[name] = {c: pixels[..., i] for i, c in enumerate(letters)}
+    attributes, _ = header_of(scene, about)
+    if scene.arto.cryptomatte:
+        rendered = home.absolute(scene.arto.cryptomatte)
+        planes, names = cryptomatte.read(rendered)
+        if any(plane.shape != field.shape for plane in planes.values()):
+            raise SceneError(f"{rendered} is a render of another size: render this shot again")
+        parts["cryptomatte"] = planes
+        attributes |= names
+    if parts:
+        exr.write_planes(data_file(path), parts, attributes)
 
 
 def comp_file(path: Path) -> Path:

@@ -293,7 +293,7 @@ def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> S
             plate.write(scene, plate.light_file(path), caught.light, about)
         yield from _into_footage(shown, caught, path, about)
     if settings.write_data:
-        plate.write_data(path, shown.field, plate.header_of(scene, about)[0])
+        plate.write_data(scene, path, shown.field, about)
     if settings.layers != "OFF":
         found = yield from layers.of_plate(shown, ready)
         if not scene.render.film_transparent:

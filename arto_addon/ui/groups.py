@@ -82,6 +82,8 @@ class ARTO_PT_layers(Panel, bpy.types.Panel):
             column.prop(settings, "layers_half")
             column.operator("arto.mix_to_scene", icon="WORLD_DATA")
         column.prop(settings, "write_data")
+        if settings.write_data:
+            column.prop(settings, "cryptomatte")
         column.prop(settings, "footage")
         column.prop(settings, "shadows")
         column.prop(settings, "use_in_compositor")

@@ -294,6 +294,14 @@ class ArtoSettings(bpy.types.PropertyGroup):
         description="Write albedo, normals and depth beside the picture, as 32-bit floats",
         default=False,
     )
+    cryptomatte: StringProperty(
+        name="Cryptomatte",
+        description="An EXR of your own render of this shot, whose Cryptomattes go into the data "
+        "file as they are",
+        subtype="FILE_PATH",
+        default="",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
     shadows: EnumProperty(
         name="Shadows",
         description="How the things of a shot with shadow catchers go into footage",
@@ -370,7 +378,7 @@ CAPTURE = (
 FIT = ("support", "separate")
 RELIGHT = (
     "own_lamps", "lamps", "lamp_samples", "denoise", "environment_width", "look", "output",
-    "layers", "layer_prefix", "layers_half", "write_data", "shadows",
+    "layers", "layer_prefix", "layers_half", "write_data", "cryptomatte", "shadows",
 )  # fmt: skip
 
 CLASSES = (ArtoGroup, ArtoSettings)

@@ -13,8 +13,8 @@ from arto.arto_addon.blender.output import float_exr
 from arto.arto_addon.relight import plate, relight
 from arto.arto_addon.relight.back import mix_to_scene
 from arto.arto_addon.shot import paths
-from arto.core import exr
-from arto.core.errors import SceneError
+from arto.core import cryptomatte, exr
+from arto.core.errors import ExrError, SceneError
 from arto.core.field import Field
 from scene_tools import assert_as_cycles, captured, small_scene
 from test_world import hdri, smooth
@@ -341,3 +341,29 @@ def test_instead_of_the_render_and_back(lit):
     lit.arto.use_in_compositor = "VIEWER"
     assert comes_from(blur) == render and not glare.inputs["Image"].links
     assert comes_from(out.inputs[0].links[0].from_node) == render
+
+
+@pytest.mark.parametrize("interleaved", [True, False])
+def test_cryptomattes_are_handed_on(lit, tmp_path, interleaved):
+    """Every rank, bit for bit, and the names: from a file of the artist's own render."""
+    lit.view_layers[0].use_pass_cryptomatte_object = True
+    settings, rendered = lit.render.image_settings, tmp_path / "mine.exr"
+    settings.media_type, settings.file_format = "MULTI_LAYER_IMAGE", "OPEN_EXR_MULTILAYER"
+    settings.use_exr_interleave = interleaved
+    lit.render.filepath, lit.cycles.samples = str(rendered), 4
+    bpy.ops.render.render(write_still=True)
+    lit.arto.write_data, lit.arto.cryptomatte = True, str(rendered)
+    path, _ = work.run(relight.relight(lit))
+    there, names = cryptomatte.read(plate.data_file(path))
+    mine, expected = cryptomatte.read(rendered)
+    assert names == expected and any("Glossy" in str(text) for text in names.values())
+    assert there.keys() == mine.keys() and len(mine) == 12
+    for name, plane in mine.items():
+        np.testing.assert_array_equal(there[name].view(np.int32), plane.view(np.int32))
+    lit.view_layers[0].use_pass_cryptomatte_object = False
+    bpy.ops.render.render(write_still=True)
+    with pytest.raises(ExrError, match="no Cryptomatte"):
+        relit(lit)
+    lit.arto.cryptomatte = str(tmp_path / "gone.exr")
+    with pytest.raises(ExrError, match="no file"):
+        relit(lit)
