@@ -84,6 +84,7 @@ def _capture(
     with asked(scene, view_layer, given) as this:
         folder = paths.unfinished_folder(claimed, this.key)
         head = unfinished(folder, this.key)
+        stopped = head is not None
         if head is None or only_estimate:
             plan, head = yield from begun(this, folder, given)
             if only_estimate:
@@ -91,12 +92,18 @@ def _capture(
                 return plan.estimate.times(takes)
             empty(folder)
         yield from _render_tiles(this.on, folder, head)
-    for name in beside.TAKES:
-        if this.catchers:
-            yield from _capture_beside(scene, view_layer, claimed / name, name, head)
-        else:
+    takes = [(folder, claimed, head)]
+    for name in beside.TAKES if this.catchers else ():
+        steps = _capture_beside(scene, view_layer, claimed / name, name, head, stopped)
+        found = yield from steps
+        takes += [found] if found else []
+    # all at the end, so that an earlier capture stays whole until then; the first one last, by
+    # which an interrupted end is gone on with
+    for each in reversed(takes):
+        yield from _finish(scene, *each)
+    if not this.catchers:
+        for name in beside.TAKES:
             empty(claimed / name)
-    yield from _finish(scene, folder, claimed, head)
     paths.forget()
     caution = f". CAUTION: {head['caution']['text']}" if head.get("caution") else ""
     yield Progress(1.0, f"captured {head['patches']} patches{caution}")
@@ -104,21 +111,29 @@ def _capture(
 
 
 def _capture_beside(
-    scene: bpy.types.Scene, view_layer: str, place: Path, name: str, first: dict[str, Any]
+    scene: bpy.types.Scene,
+    view_layer: str,
+    place: Path,
+    name: str,
+    first: dict[str, Any],
+    stopped: bool,
 ) -> Steps:
-    """Capture a take beside the one of everything, which `first` describes."""
+    """Render a take beside the one of everything, which `first` describes -> where it is, where it
+    belongs, its description. stopped: whether this goes on with a capture that was stopped; then
+    None where the take is there already."""
     given = beside.given_by(first)
     with asked(scene, view_layer, given, name) as this:
         folder = paths.unfinished_folder(place, this.key)
         head = unfinished(folder, this.key)
-        if head is None and beside.is_there(place / "capture", this.key, first["key"]):
-            return
+        there = place / "capture"
+        if head is None and stopped and beside.is_there(there, this.key, first["key"]):
+            return None
         if head is None:
             _, head = yield from begun(this, folder, given, len(first["tiles"]))
             empty(folder)
         head[beside.PAIR] = first["key"]
         yield from _render_tiles(this.on, folder, head)
-    yield from _finish(scene, folder, place, head)
+    return folder, place, head
 
 
 def _finish(scene: bpy.types.Scene, unfinished: Path, place: Path, head: dict[str, Any]) -> Steps:

@@ -398,3 +398,29 @@ def test_light_can_be_added_instead(tmp_path):
     comp = exr.read(plate.comp_file(path))[""]
     np.testing.assert_allclose(comp, whole[..., :3], atol=2e-3)
     assert plate.light_file(path).is_file()
+
+
+def test_an_earlier_capture_stays_whole_until_the_new_one_is(tmp_path):
+    """Stopped in its last take, a new capture has replaced nothing of the old one."""
+    scene = with_catcher(tmp_path, samples=4, patches=1)
+    captured(scene)
+    expected = relit(scene)
+    scene.arto.samples = 5
+    count = 0
+    steps = capture.capture(scene, scene.view_layers[0].name)
+    for step in steps:
+        if isinstance(step, work.Render):
+            count += "basis images" in step.text
+            if count == 3:
+                break
+            work.blocking_render(step)
+    steps.close()
+    for one, two in zip(relit(scene), expected, strict=True):
+        np.testing.assert_array_equal(one, two)
+    captured(scene)
+    assert Field(paths.field_folder(scene)).about["samples"] == 5
+    relit(scene)
+    # and without the catcher, there is one take again
+    scene.objects["Floor"].is_shadow_catcher = False
+    captured(scene)
+    assert not (paths.field_folder(scene).parent / "ground").exists()
