@@ -118,6 +118,41 @@ def cycles(scene: bpy.types.Scene, samples: int, seed: int, folder: Path) -> np.
     return next(iter(exr.read(folder / "cycles.exr").values()))
 
 
+def made_by_nodes(thing: bpy.types.Object, maker: bpy.types.Object) -> None:
+    """Let an object's geometry nodes make an instance of a thing, and nothing else."""
+    tree = bpy.data.node_groups.new("Made", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    info = tree.nodes.new("GeometryNodeObjectInfo")
+    info.inputs["Object"].default_value = thing
+    info.inputs["As Instance"].default_value = True
+    out = tree.nodes.new("NodeGroupOutput")
+    tree.links.new(info.outputs["Geometry"], out.inputs[0])
+    maker.modifiers.new("Made", "NODES").node_group = tree
+
+
+def in_compositor(scene: bpy.types.Scene, group: Any, output: str) -> Any:
+    """A node group's node in a compositor of the scene that puts out one of its outputs."""
+    tree = bpy.data.node_groups.new("Comp", "CompositorNodeTree")
+    tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+    node, out = tree.nodes.new("CompositorNodeGroup"), tree.nodes.new("NodeGroupOutput")
+    node.node_tree = group
+    tree.links.new(node.outputs[output], out.inputs[0])
+    scene.compositing_node_group = tree
+    return node
+
+
+def composited(scene: bpy.types.Scene, folder: Path) -> np.ndarray:
+    """What Blender's compositor puts out of a scene -> (H, W, 4)."""
+    from arto.arto_addon.blender.output import float_exr
+    from arto.core import exr
+
+    scene.render.use_compositing, scene.cycles.samples = True, 1
+    float_exr(scene.render, multilayer=False)
+    scene.render.filepath = str(folder / "composited.exr")
+    bpy.ops.render.render(write_still=True)
+    return next(iter(exr.read(folder / "composited.exr").values()))
+
+
 def assert_as_cycles(picture: np.ndarray, scene: Any, samples: int, folder: Path) -> None:
     """A plate (H, W, 4) is what Cycles renders: off by less than two of its renders are from each
     other, twice over, and as bright to a hundredth."""

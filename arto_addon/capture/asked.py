@@ -121,16 +121,18 @@ def asked(
         )
 
 
-def begun(this: Asked, folder: Path, given: Given | None, strips: int | None = None) -> Steps:
+def begun(
+    this: Asked, folder: Path, given: Given | None, strips: int | None = None, takes: int = 1
+) -> Steps:
     """Look at the scene and plan the capture -> (`Planned`, the description of its capture set,
     with no tile rendered yet).
 
     folder: where it will be; strips: into how many tiles the picture is cut (default: as the memory
-    says). Raises SceneError.
+    says); takes: see `planned`. Raises SceneError.
     """
     settings = this.scene.arto
     plan: Planned = yield from planned(
-        this.scene, this.on, this.hemicube, this.region, this.grain, folder, given, strips
+        this.scene, this.on, this.hemicube, this.region, this.grain, folder, given, strips, takes
     )
     about = {
         "scene": this.scene.name,

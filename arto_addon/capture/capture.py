@@ -86,10 +86,10 @@ def _capture(
         head = unfinished(folder, this.key)
         stopped = head is not None
         if head is None or only_estimate:
-            plan, head = yield from begun(this, folder, given)
+            count = 1 + len(beside.TAKES) * this.catchers
+            plan, head = yield from begun(this, folder, given, takes=count)
             if only_estimate:
-                takes = 1 + len(beside.TAKES) * this.catchers
-                return plan.estimate.times(takes)
+                return plan.estimate
             empty(folder)
         yield from _render_tiles(this.on, folder, head)
     takes = [(folder, claimed, head)]

@@ -60,9 +60,11 @@ def planned(
     folder: Path,
     given: Given | None,
     strips: int | None = None,
+    takes: int = 1,
 ) -> Steps:
     """Look at the scene, by small renders -> `Planned`. strips: into how many tiles the picture is
-    cut (default: as the memory says). Raises SceneError where there is no room for it."""
+    cut (default: as the memory says); takes: so many captures like this are to come. Raises
+    SceneError where there is no room for them."""
     settings = scene.arto
     if given:
         route, caution = given.route, given.caution
@@ -86,7 +88,8 @@ def planned(
             paths_traced = region.pixels * settings.samples * len(plan)
             seconds = renders * on.pace.ready + paths_traced * on.pace.path
             seconds += sum(plan) * len(tiles) * on.pace.layer
-        return tiles, room.estimate(plan, tiles, len(hemicube), not kept, seconds)
+        one = room.estimate(plan, tiles, len(hemicube), not kept, seconds)
+        return tiles, one.times(takes)
 
     kept = settings.keep != "never"
     tiles, estimate = estimated(kept)

@@ -20,6 +20,7 @@ from ..world import kept
 from ..world.check import check_world
 from . import layers
 from .mixer import EXPOSURE_SOCKET, SOURCE
+from .plate import layers_file
 from .relight import Shown
 
 WORLD = "ARTO Mix"
@@ -71,6 +72,12 @@ def mix_to_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> Path:
     mix, settings = mix_of(scene), scene.arto
     shown = Shown(scene, layer)
     world = check_world(scene, layer)
+    lit = exr.header(layers_file(paths.relit_file(scene))).get("arto.world")
+    if lit != world.name:
+        raise SceneError(
+            f"the layers are of the world '{lit}', and the scene has '{world.name}': relight first"
+        )
+    _check_lamps(scene, mix)
     whole = kept.environment(scene, settings.environment_width, layer)
     image = np.zeros_like(whole.image)
     left = np.ones(whole.image.shape[:2], np.float32)
@@ -89,25 +96,36 @@ def mix_to_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> Path:
     return path
 
 
+def _layer_of(scene: bpy.types.Scene, thing: bpy.types.Object) -> str:
+    """The layer that a lamp is in."""
+    groups = {g.name for layer in scene.view_layers for g in layer.lightgroups}
+    name = layers.OWN + (f"_{safe_name(thing.lightgroup)}" if thing.lightgroup in groups else "")
+    return f"{scene.arto.layer_prefix}{layers.layer_name(name)}"
+
+
+def _lamps(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    return [thing for thing in scene.objects if thing.type == "LIGHT"]
+
+
+def _check_lamps(scene: bpy.types.Scene, mix: Mix) -> None:
+    """Raise SceneError where a lamp would have to change that cannot."""
+    for thing in _lamps(scene):
+        gain = scene.arto.own_lamps * mix.of(_layer_of(scene, thing))
+        if thing.data.library and not np.allclose(gain, 1):
+            raise SceneError(f"the lamp '{thing.name}' is linked: make it local to dim it")
+
+
 def _gain_lamps(scene: bpy.types.Scene, mix: Mix) -> None:
     """Multiply the scene's lamps by their layers' gains."""
-    prefix, own = scene.arto.layer_prefix, scene.arto.own_lamps
-    groups = {g.name for layer in scene.view_layers for g in layer.lightgroups}
     gained: dict[str, dict[Any, NDArray]] = {}
-    for thing in scene.objects:
-        if thing.type != "LIGHT":
-            continue
-        group = thing.lightgroup if thing.lightgroup in groups else ""
-        name = layers.OWN + (f"_{safe_name(group)}" if group else "")
-        gain = own * mix.of(f"{prefix}{layers.layer_name(name)}")
+    for thing in _lamps(scene):
         if thing.data.library:
-            if not np.allclose(gain, 1):
-                raise SceneError(f"the lamp '{thing.name}' is linked: make it local to dim it")
-            continue
+            continue  # which stays as it is, see `_check_lamps`
+        name = _layer_of(scene, thing)
         if any(thing.data in lamps for other, lamps in gained.items() if other != name):
             # shared with a lamp of another layer
             thing.data = thing.data.copy()
-        gained.setdefault(name, {})[thing.data] = gain
+        gained.setdefault(name, {})[thing.data] = scene.arto.own_lamps * mix.of(name)
     for lamps in gained.values():
         for lamp, gain in lamps.items():
             most = float(gain.max())

@@ -6,7 +6,6 @@ word. So a picture of known noise is denoised once, and what cannot denoise says
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +17,8 @@ from ...core import exr
 from ...core.field import Field
 from ...core.field_writer import write_head
 from ...core.tile_writer import write_layer
-from ..blender.output import float_exr, write_to
-from ..work import Progress, Render, Steps, blocking_render
+from ..blender.compositing import studio
+from ..work import Progress, Steps
 from .plate import mixed
 
 _available: list[bool] = []
@@ -92,58 +91,34 @@ def denoise(
     denoiser it is, by device and quality.
     """
     height, width = pictures[0].shape[:2]
-    studio = bpy.data.scenes.new("ARTO Denoise")
-    made: list[Any] = [studio]
-    with tempfile.TemporaryDirectory() as folder:
-        try:
-            tree = bpy.data.node_groups.new("ARTO Denoise", "CompositorNodeTree")
-            made.append(tree)
-            tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+    with studio("ARTO Denoise") as on:
+        tree = on.tree
 
-            def source(name: str, pixels: NDArray, space: str) -> Any:
-                path = Path(folder) / f"{name}.exr"
-                exr.write(path, {"": pixels})
-                image = bpy.data.images.load(str(path))
-                made.append(image)
-                image.colorspace_settings.name = space
-                node = tree.nodes.new("CompositorNodeImage")
-                node.image = image
-                return node.outputs["Image"]
+        def source(name: str, pixels: NDArray, space: str) -> Any:
+            path = on.folder / f"{name}.exr"
+            exr.write(path, {"": pixels})
+            image = bpy.data.images.load(str(path))
+            on.made.append(image)
+            image.colorspace_settings.name = space
+            node = tree.nodes.new("CompositorNodeImage")
+            node.image = image
+            return node.outputs["Image"]
 
-            steer = {}
-            if {"albedo", "normal"} <= guides.keys():
-                steer = {
-                    "Albedo": source("albedo", guides["albedo"], "Non-Color"),
-                    "Normal": source("normal", guides["normal"], "Non-Color"),
-                }
-            total = None
-            for i, picture in enumerate(pictures):
-                node = tree.nodes.new("CompositorNodeDenoise")
-                node.inputs["HDR"].default_value = True
-                node.inputs["Prefilter"].default_value = "None" if clean else "Accurate"
-                noisy = source(f"picture{i}", picture, bpy.data.colorspace.working_space)
-                for name, socket in {"Image": noisy, **steer}.items():
-                    tree.links.new(socket, node.inputs[name])
-                total = (
-                    node.outputs[0] if total is None else mixed(tree, "ADD", total, node.outputs[0])
-                )
-            out = tree.nodes.new("NodeGroupOutput")
-            tree.links.new(total, out.inputs[0])
-            studio.compositing_node_group = tree
-            render = studio.render
-            render.engine = "CYCLES"
-            render.resolution_x, render.resolution_y = width, height
-            render.resolution_percentage = 100
-            render.use_compositing = True
-            render.compositor_device, render.compositor_precision = "CPU", "FULL"
-            for name in _DENOISER if like else ():
-                setattr(render, name, getattr(like.render, name))
-            float_exr(render, multilayer=False)
-            path = Path(folder) / "denoised.exr"
-            write_to(render, path)
-            request = Render(studio.name, 0, "denoising")
-            blocking_render(request)
-            request.check()
-            return np.ascontiguousarray(next(iter(exr.read(path).values()))[..., :3])
-        finally:
-            bpy.data.batch_remove(made)
+        steer = {}
+        if {"albedo", "normal"} <= guides.keys():
+            steer = {
+                "Albedo": source("albedo", guides["albedo"], "Non-Color"),
+                "Normal": source("normal", guides["normal"], "Non-Color"),
+            }
+        total = None
+        for i, picture in enumerate(pictures):
+            node = tree.nodes.new("CompositorNodeDenoise")
+            node.inputs["HDR"].default_value = True
+            node.inputs["Prefilter"].default_value = "None" if clean else "Accurate"
+            noisy = source(f"picture{i}", picture, bpy.data.colorspace.working_space)
+            for name, socket in {"Image": noisy, **steer}.items():
+                tree.links.new(socket, node.inputs[name])
+            total = node.outputs[0] if total is None else mixed(tree, "ADD", total, node.outputs[0])
+        for name in _DENOISER if like else ():
+            setattr(on.scene.render, name, getattr(like.render, name))
+        return np.ascontiguousarray(on.composite(total, (width, height), "denoising")[..., :3])

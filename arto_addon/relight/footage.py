@@ -7,7 +7,6 @@ scene's frame, brought to the picture's size.
 from __future__ import annotations
 
 import math
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,11 +15,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core import exr
 from ...core.errors import SceneError
-from ..blender.output import float_exr, write_to
+from ..blender.compositing import studio
 from ..stage.stage import picture_size
-from ..work import Render, blocking_render
 
 # How a picture of another shape fills the frame, by the camera's word for it.
 _FILLS = {"STRETCH": "Stretch", "FIT": "Fit", "CROP": "Crop"}
@@ -44,42 +41,28 @@ class Footage:
     def read(self, scene: bpy.types.Scene) -> NDArray[np.float32]:
         """The footage at the scene's frame -> (H, W, 3), scene-linear, of the picture's size.
 
-        Raises SceneError where Blender cannot read it.
+        Raises SceneError where Blender cannot read it, or it is no picture.
         """
-        width, height = picture_size(scene)
-        studio = bpy.data.scenes.new("ARTO Footage")
-        made: list[Any] = [studio]
-        try:
-            tree = bpy.data.node_groups.new("ARTO Footage", "CompositorNodeTree")
-            made.append(tree)
-            tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
-            scale = tree.nodes.new("CompositorNodeScale")
+        with studio("ARTO Footage") as on:
+            scale = on.tree.nodes.new("CompositorNodeScale")
             scale.inputs["Type"].default_value = "Render Size"
             scale.inputs["Frame Type"].default_value = _FILLS[self.fills]
-            out = tree.nodes.new("NodeGroupOutput")
-            tree.links.new(self._node(tree).outputs["Image"], scale.inputs["Image"])
-            tree.links.new(scale.outputs["Image"], out.inputs[0])
-            studio.compositing_node_group = tree
-            render = studio.render
-            render.engine = "CYCLES"
-            render.resolution_x, render.resolution_y = width, height
-            render.resolution_percentage = 100
-            render.fps, render.fps_base = scene.render.fps, scene.render.fps_base
-            render.use_compositing = True
-            render.compositor_device, render.compositor_precision = "CPU", "FULL"
-            studio.frame_set(scene.frame_current, subframe=scene.frame_subframe)
-            float_exr(render, multilayer=False)
-            with tempfile.TemporaryDirectory() as folder:
-                path = Path(folder) / "footage.exr"
-                write_to(render, path)
-                request = Render(studio.name, 0, "footage")
-                blocking_render(request)
-                request.check()
-                found = next(iter(exr.read(path).values()))
-        finally:
-            bpy.data.batch_remove(made)
-        if found.shape[:2] != (height, width):
-            raise SceneError(f"Blender could not read the footage '{self.name}': look at its file")
+            on.tree.links.new(self._node(on.tree).outputs["Image"], scale.inputs["Image"])
+            on.scene.render.fps, on.scene.render.fps_base = scene.render.fps, scene.render.fps_base
+            on.scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
+            size = picture_size(scene)
+            found = on.composite(scale.outputs["Image"], size, "reading the footage")
+        # what Blender cannot read is nothing to it, and it says no word
+        if found.shape[1::-1] != size or not found[..., 3].any():
+            raise SceneError(
+                f"Blender shows nothing of the footage '{self.name}' at frame "
+                f"{scene.frame_current}: look whether its file is there and whole"
+            )
+        if bad := int((~np.isfinite(found)).any(axis=-1).sum()):
+            raise SceneError(
+                f"the footage '{self.name}' has {bad} pixels that are infinite or not a number: "
+                "repair them, or choose another"
+            )
         return np.ascontiguousarray(found[..., :3])
 
     def _node(self, tree: Any) -> Any:
@@ -118,16 +101,19 @@ def _chosen(scene: bpy.types.Scene) -> Footage | None:
     image = scene.arto.footage
     if image is None:
         return None
-    duration = max(image.frame_duration, 1)
-    timing = _Timing(duration) if image.source in {"SEQUENCE", "MOVIE"} else None
+    timing = _Timing() if image.source in {"SEQUENCE", "MOVIE"} else None
     return Footage(image, timing, "CROP")
 
 
 @dataclass(frozen=True)
 class _Timing:
-    """Of a sequence that is chosen by itself: its first picture at frame 1."""
+    """Of a sequence or movie that is chosen by itself: each frame shows the picture of its number.
 
-    frame_duration: int
+    An image does not know how many pictures it has; of one that is not there nothing is shown,
+    which is said.
+    """
+
+    frame_duration: int = 1_000_000
     frame_start: int = 1
     frame_offset: int = 0
     use_cyclic: bool = False

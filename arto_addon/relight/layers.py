@@ -23,7 +23,7 @@ from ...core.relight import relights, together
 from ...core.shot import safe_name
 from ..work import Progress, Steps
 from ..world import kept
-from ..world.lamp_render import lamp_light
+from ..world.lamp_render import lamp_light, lamp_samples
 from . import denoise
 from .plate import layers_file
 
@@ -112,7 +112,7 @@ def of_plate(shot: Shown, ready: Ready) -> Steps:
             light = lamps
             if len(some) > 1:
                 mine = part_of(ready.found.lamps, parts[name])
-                samples = max(4, round(share * scene.arto.lamp_samples))
+                samples = lamp_samples(scene, share * ready.found.share)
                 light = yield from lamp_light(scene, field, mine, samples, 0.9)
             found[name] = found[name] + light
     if scene.arto.own_lamps and shown.own.any():

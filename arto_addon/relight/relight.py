@@ -30,7 +30,7 @@ from ..work import Progress, Steps
 from ..world import kept
 from ..world.background import background, background_with_holes, holds_out
 from ..world.check import check_world, differs_by_rays
-from ..world.lamp_render import brightness, lamp_light, region_of
+from ..world.lamp_render import brightness, lamp_light, lamp_samples, region_of
 from . import denoise, layers, plate
 from .footage import footage
 from .present import present
@@ -42,13 +42,6 @@ NEARLY_ALL = 0.9
 OPAQUE = 1 - 1e-5
 # A lamp of more than this share of the light is looked for behind the plate by every pixel.
 LEAST_SHARE = 1e-3
-# Fewer samples of the lamps than this have no time to smooth an edge.
-LEAST_SAMPLES = 4
-
-
-def lamp_samples(scene: bpy.types.Scene, share: float) -> int:
-    """Samples of the render of lamps that have this share of the light."""
-    return max(LEAST_SAMPLES, math.ceil(scene.arto.lamp_samples * share))
 
 
 @dataclass(frozen=True)
@@ -77,6 +70,7 @@ class Shown:
         self.field = Field(folder)
         self._changed: dict[tuple[int, float], list[str]] = {}
         self._split: tuple[NDArray[np.float32], Split] | None = None
+        self._filmed: tuple[tuple[int, float], tuple[str, NDArray[np.float32]]] | None = None
         self.held = self.field.about.get("route") == SAMPLED
         # of a shot with shadow catchers: of everything, of the catchers, of the things
         self.takes = [self]
@@ -109,6 +103,17 @@ class Shown:
             found = changed_since(self.scene, self.layer, self.field.about, now=True)
             self._changed = {frame: found}
         return self._changed[frame]
+
+    def filmed(self) -> tuple[str, NDArray[np.float32]] | None:
+        """The name and the picture of the footage that the things of a shot with shadow catchers
+        are put into, at its frame; read once for all lights. Raises SceneError."""
+        found = footage(self.scene) if len(self.takes) > 1 else None
+        if found is None:
+            return None
+        key = self.scene.frame_current, self.scene.frame_subframe
+        if self._filmed is None or self._filmed[0] != key:
+            self._filmed = key, (found.name, found.read(self.scene))
+        return self._filmed[1]
 
     def split(self, whole: Environment) -> Split:
         """The lamps cut out of a light. Where patches are all around, a turned map is cut as it was
@@ -213,8 +218,7 @@ def make_ready(shown: Shown, lit: Light) -> Steps:
     if changed:
         # allowed: it is the artist who knows whether it shows
         yield Progress(0.0, f"the scene is not the captured one: {'; '.join(changed[:3])}")
-    if len(shown.takes) > 1:
-        footage(scene)  # what cannot be read is said before the long work
+    shown.filmed()  # what cannot be read is said before the long work
     yield Progress(0.0, "bringing the world to an environment map")
     if by_rays := differs_by_rays(world):
         yield Progress(0.0, f"the world is {by_rays}")
@@ -326,14 +330,14 @@ def _into_footage(
     shown: Shown, caught: Caught, path: Path, about: dict[str, str]
 ) -> Iterator[Progress]:
     """Write the things in the artist's footage, where there is some."""
-    found = footage(shown.scene)
+    found = shown.filmed()
     if found is None:
         return
-    yield Progress(0.9, f"putting it into the footage: {found.name}")
-    there = found.read(shown.scene)
+    name, there = found
+    yield Progress(0.9, f"putting it into the footage: {name}")
     adds = shown.scene.arto.shadows == "ADD"
     comp = caught.added_to(there) if adds else caught.over(there)
-    plate.write(shown.scene, plate.comp_file(path), comp, about | {"footage": found.name})
+    plate.write(shown.scene, plate.comp_file(path), comp, about | {"footage": name})
 
 
 def _lamps(shown: Shown, found: Split) -> Steps:

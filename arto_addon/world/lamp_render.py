@@ -6,6 +6,7 @@ patch, which is why the field is better off without them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
@@ -54,6 +55,15 @@ def world_of(on: Stage, shown: Environment, group: str = "") -> Any:
     world.cycles.sampling_method = "MANUAL"
     world.cycles.sample_map_resolution = 2 * width
     return world
+
+
+# Fewer samples of the lamps than this have no time to smooth an edge.
+LEAST_SAMPLES = 4
+
+
+def lamp_samples(scene: bpy.types.Scene, share: float) -> int:
+    """Samples of the render of lamps that have this share of the light."""
+    return max(LEAST_SAMPLES, math.ceil(scene.arto.lamp_samples * share))
 
 
 def region_of(field: Field) -> Region:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from arto.arto_addon import fit, work
 from arto.arto_addon.blender.output import float_exr
-from arto.arto_addon.capture import capture
+from arto.arto_addon.capture import capture, room
 from arto.arto_addon.capture.sequence import capture_frames
 from arto.arto_addon.farm.plan import plan
 from arto.arto_addon.relight import plate, relight
@@ -22,7 +22,18 @@ from arto.core import exr
 from arto.core.errors import CancelledError, FarmError, FieldError, SceneError
 from arto.core.field import Field
 from arto.core.light import PatchLight
-from scene_tools import BOX, add_mesh, captured, differences, set_colour, small_scene, snapshot
+from scene_tools import (
+    BOX,
+    add_mesh,
+    captured,
+    composited,
+    differences,
+    in_compositor,
+    made_by_nodes,
+    set_colour,
+    small_scene,
+    snapshot,
+)
 from test_checks import instance_of
 from test_world import hdri, smooth
 
@@ -134,15 +145,7 @@ def test_however_a_catcher_comes_into_the_scene(tmp_path, how):
             to.collections = ["Kept"]
         scene.collection.children.link(to.collections[0])
     else:
-        tree = bpy.data.node_groups.new("Made", "GeometryNodeTree")
-        tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-        info = tree.nodes.new("GeometryNodeObjectInfo")
-        info.inputs["Object"].default_value = floor
-        info.inputs["As Instance"].default_value = True
-        out = tree.nodes.new("NodeGroupOutput")
-        tree.links.new(info.outputs["Geometry"], out.inputs[0])
-        maker = add_mesh(scene, "Maker", [], [])
-        maker.modifiers.new("Made", "NODES").node_group = tree
+        made_by_nodes(floor, add_mesh(scene, "Maker", [], []))
     captured(scene)
     _, share = relit(scene)
     np.testing.assert_allclose(share, expected, atol=0.02)
@@ -282,20 +285,9 @@ def test_the_group_puts_footage_behind(tmp_path):
     scene = with_catcher(tmp_path, samples=8, patches=1)
     captured(scene)
     picture, share = relit(scene)
-    group = bpy.data.node_groups["ARTO Relit"]
-    tree = bpy.data.node_groups.new("Comp", "CompositorNodeTree")
-    tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
-    node, out = tree.nodes.new("CompositorNodeGroup"), tree.nodes.new("NodeGroupOutput")
-    node.node_tree = group
+    node = in_compositor(scene, bpy.data.node_groups["ARTO Relit"], "Composite")
     node.inputs["Footage"].default_value = (0.2, 0.4, 0.6, 1)
-    tree.links.new(node.outputs["Composite"], out.inputs[0])
-    scene.compositing_node_group = tree
-    scene.render.use_compositing = True
-    scene.cycles.samples = 1
-    float_exr(scene.render, multilayer=False)
-    scene.render.filepath = str(tmp_path / "group.exr")
-    bpy.ops.render.render(write_still=True)
-    found = next(iter(exr.read(tmp_path / "group.exr").values()))[..., :3]
+    found = composited(scene, tmp_path)[..., :3]
     np.testing.assert_allclose(found, picture[..., :3] + share * (0.2, 0.4, 0.6), atol=1e-4)
 
 
@@ -356,16 +348,10 @@ def test_farms_refuse_catchers(tmp_path):
 def test_footage_of_the_frame(tmp_path, kind):
     """A sequence or a movie clip behind the camera shows the scene's frame."""
     scene = with_catcher(tmp_path, samples=4, patches=1)
-    for frame, grey in ((1, 0.2), (2, 0.6)):
-        image = bpy.data.images.new(f"Frame{frame}", 24, 18)
-        image.pixels.foreach_set(np.tile(np.float32([grey, grey, grey, 1]), 24 * 18))
-        image.filepath_raw = str(tmp_path / f"filmed_{frame:04d}.png")
-        image.file_format = "PNG"
-        image.save()
+    first = str(filmed(tmp_path, 0.2, 0.6))
     camera = scene.camera.data
     camera.show_background_images = True
     behind = camera.background_images.new()
-    first = str(tmp_path / "filmed_0001.png")
     if kind == "sequence":
         behind.image = bpy.data.images.load(first)
         behind.image.source = "SEQUENCE"
@@ -424,3 +410,69 @@ def test_an_earlier_capture_stays_whole_until_the_new_one_is(tmp_path):
     scene.objects["Floor"].is_shadow_catcher = False
     captured(scene)
     assert not (paths.field_folder(scene).parent / "ground").exists()
+
+
+def filmed(tmp_path, *greys):
+    """Pictures of a grey, numbered, as 8-bit files."""
+    for frame, grey in enumerate(greys, 1):
+        image = bpy.data.images.new(f"Frame{frame}", 24, 18)
+        image.pixels.foreach_set(np.tile(np.float32([grey, grey, grey, 1]), 24 * 18))
+        image.filepath_raw = str(tmp_path / f"filmed_{frame:04d}.png")
+        image.file_format = "PNG"
+        image.save()
+    return tmp_path / "filmed_0001.png"
+
+
+def test_a_chosen_sequence_shows_the_picture_of_the_frames_number(tmp_path):
+    """And where one is not there, that is said: no other is taken for it."""
+    scene = with_catcher(tmp_path, samples=4, patches=1)
+    scene.arto.footage = bpy.data.images.load(str(filmed(tmp_path, 0.2, 0.4, 0.6)))
+    scene.arto.footage.source = "SEQUENCE"
+    for frame, grey in ((1, 0.2), (3, 0.6), (2, 0.4)):
+        scene.frame_set(frame)
+        linear = ((round(grey * 255) / 255 + 0.055) / 1.055) ** 2.4
+        np.testing.assert_allclose(footage(scene).read(scene), linear, atol=2e-3)
+    scene.frame_set(4)
+    with pytest.raises(SceneError, match="at frame 4"):
+        footage(scene).read(scene)
+
+
+@pytest.mark.parametrize("what", ["truncated", "nan"])
+def test_footage_that_is_no_picture_is_said_before_anything_is_written(tmp_path, what):
+    scene = with_catcher(tmp_path, samples=4, patches=1)
+    captured(scene)
+    if what == "truncated":
+        path = filmed(tmp_path, 0.5)
+        path.write_bytes(path.read_bytes()[:60])
+        match = "shows nothing"
+    else:
+        path, match = tmp_path / "filmed.exr", "1 pixels that are infinite or not a number"
+        pixels = np.ones((18, 24, 4), np.float32)
+        pixels[3, 3, 0] = np.nan
+        exr.write(path, {"": pixels})
+    scene.arto.footage = bpy.data.images.load(str(path))
+    scenes = len(bpy.data.scenes)
+    with pytest.raises(SceneError, match=match):
+        relit(scene)
+    assert not paths.relit_file(scene).exists() and len(bpy.data.scenes) == scenes
+
+
+def test_all_takes_must_find_room(tmp_path, monkeypatch):
+    """Before the first of them is rendered: the estimate and the disk are of all three."""
+    scene = with_catcher(tmp_path, samples=4, patches=1)
+    steps = lambda: capture.capture(scene, scene.view_layers[0].name, only_estimate=True)  # noqa: E731
+    three = work.run(steps())
+    scene.objects["Floor"].is_shadow_catcher = False
+    one = work.run(steps())
+    assert three.renders == 3 * one.renders and three.kept == 3 * one.kept
+    scene.objects["Floor"].is_shadow_catcher = True
+    free = one.disk + one.kept  # room for one, and not for three
+    real = room.shutil.disk_usage
+    monkeypatch.setattr(room.shutil, "disk_usage", lambda p: real(p)._replace(free=int(free)))
+    rendered = []
+    with pytest.raises(SceneError, match=r"needs .* of disk"):
+        for step in capture.capture(scene, scene.view_layers[0].name):
+            if isinstance(step, work.Render):
+                rendered.append(step.text)
+                work.blocking_render(step)
+    assert not any("basis images" in text for text in rendered)

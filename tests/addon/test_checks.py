@@ -8,7 +8,7 @@ from arto.arto_addon.stage.bounds import rendered
 from arto.arto_addon.stage.stage import stage
 from arto.arto_addon.world.check import check_no_volume
 from arto.core.errors import SceneError
-from scene_tools import BOX, add_mesh
+from scene_tools import BOX, add_mesh, made_by_nodes
 
 
 def catchers(scene):
@@ -45,14 +45,7 @@ def test_catcher_in_an_instance_of_an_instance(scene):
 def test_catcher_made_by_geometry_nodes(scene):
     kept = bpy.data.collections.new("Kept")
     thing = a_catcher(scene, kept)
-    tree = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
-    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    info = tree.nodes.new("GeometryNodeObjectInfo")
-    info.inputs["Object"].default_value = thing
-    info.inputs["As Instance"].default_value = True
-    out = tree.nodes.new("NodeGroupOutput")
-    tree.links.new(info.outputs["Geometry"], out.inputs[0])
-    scene.objects["Matt"].modifiers.new("Scatter", "NODES").node_group = tree
+    made_by_nodes(thing, scene.objects["Matt"])
     assert catchers(scene) == ["Catcher"]
 
 

@@ -9,14 +9,13 @@ import numpy as np
 import OpenImageIO
 import pytest
 from arto.arto_addon import work
-from arto.arto_addon.blender.output import float_exr
 from arto.arto_addon.relight import plate, relight
 from arto.arto_addon.relight.back import mix_to_scene
 from arto.arto_addon.shot import paths
 from arto.core import cryptomatte, exr
 from arto.core.errors import ExrError, SceneError
 from arto.core.field import Field
-from scene_tools import assert_as_cycles, captured, small_scene
+from scene_tools import assert_as_cycles, captured, composited, in_compositor, small_scene
 from test_world import hdri, smooth
 
 
@@ -190,26 +189,13 @@ def test_the_mixer_in_the_compositor(lit, tmp_path):
     """With every gain at one it gives the plate; a gain dims its layer alone, a tint colours it."""
     picture, found = relit(lit)
     group = bpy.data.node_groups["ARTO Relit Mix"]
-    tree = bpy.data.node_groups.new("Comp", "CompositorNodeTree")
-    tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
-    node, out = tree.nodes.new("CompositorNodeGroup"), tree.nodes.new("NodeGroupOutput")
-    node.node_tree = group
-    tree.links.new(node.outputs["Image"], out.inputs[0])
-    lit.compositing_node_group = tree
-    lit.render.use_compositing, lit.cycles.samples = True, 1
-    float_exr(lit.render, multilayer=False)
-
-    def composited():
-        lit.render.filepath = str(tmp_path / "mix.exr")
-        bpy.ops.render.render(write_still=True)
-        return next(iter(exr.read(tmp_path / "mix.exr").values()))
-
-    np.testing.assert_allclose(composited(), picture, rtol=1e-4, atol=1e-5)
+    node = in_compositor(lit, group, "Image")
+    np.testing.assert_allclose(composited(lit, tmp_path), picture, rtol=1e-4, atol=1e-5)
     node.inputs["LG_top"].default_value = 0.25
     node.inputs["LG_own Tint"].default_value = (1, 0, 0, 1)
     node.inputs["Exposure"].default_value = 1.0
     mixed = sum(found.values()) - 0.75 * found["LG_top"] - found["LG_own"] * (0, 1, 1)
-    np.testing.assert_allclose(composited()[..., :3], 2 * mixed, rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(composited(lit, tmp_path)[..., :3], 2 * mixed, rtol=1e-4, atol=1e-5)
     # kept: another relight puts new pixels into the same nodes and sockets
     nodes = len(group.nodes)
     relit(lit)
@@ -222,7 +208,7 @@ def test_the_mixer_in_the_compositor(lit, tmp_path):
     for name in ("LG_own Tint",):
         node.inputs[name].default_value = (1, 1, 1, 1)
     node.inputs["Exposure"].default_value = 0.0
-    np.testing.assert_allclose(composited(), picture, rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(composited(lit, tmp_path), picture, rtol=1e-4, atol=1e-5)
 
 
 @pytest.mark.parametrize("patches", [1, 3])
@@ -300,6 +286,11 @@ def test_a_mix_goes_back_to_the_scene(tmp_path):
     path = mix_to_scene(scene)
     assert path.is_file() and scene.world.name == "ARTO Mix"
     assert_as_cycles(np.dstack([mixed / 2, relit_alpha(scene)]), scene, 512, tmp_path)
+    # given once, it is not given again on top of itself
+    energies = [lamp.data.energy for lamp in lamps]
+    with pytest.raises(SceneError, match="relight first"):
+        mix_to_scene(scene)
+    assert [lamp.data.energy for lamp in lamps] == energies
     node.inputs["LG_key"].default_value = 1.0
     link = scene.compositing_node_group.nodes.new("ShaderNodeValue")
     scene.compositing_node_group.links.new(link.outputs[0], node.inputs["LG_key"])
