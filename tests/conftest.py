@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,6 +15,10 @@ from tools import package
 
 @pytest.fixture(scope="session")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Program]:
+    if not os.environ.get("BLENDER"):
+        pytest.skip(
+            "BLENDER is not set: it is the command line of the Blender executable to test in"
+        )
     home = tmp_path_factory.mktemp("blender")
     out = Program(home)
     zipped = package.build(only_here=True)

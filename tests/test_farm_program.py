@@ -13,13 +13,8 @@ import time
 from pathlib import Path
 
 import numpy as np
-import pytest
 from program_tools import Program, said
 
-pytestmark = pytest.mark.skipif(
-    not os.environ.get("BLENDER"),
-    reason="BLENDER is not set: it is the command line of the Blender executable to test in",
-)
 # One machine, with the tiles that the job has.
 ALONE = """
 import bpy

@@ -20,10 +20,6 @@ import pytest
 from arto.core import exr
 from program_tools import HEIGHT, MAKE_SCENE, ROOT, WIDTH, Program, said
 
-pytestmark = pytest.mark.skipif(
-    not os.environ.get("BLENDER"),
-    reason="BLENDER is not set: it is the command line of the Blender executable to test in",
-)
 # Mean relative error that 2x2 patches a face and 256 samples may leave; 0.02 was measured.
 TOLERANCE = 0.05
 BATCH = "import bpy; bpy.ops.arto.capture(); bpy.ops.arto.fit(); bpy.ops.arto.relight()"

@@ -16,10 +16,6 @@ from arto.core import exr
 from program_tools import Program
 from window_tools import Window, windows
 
-pytestmark = pytest.mark.skipif(
-    not os.environ.get("BLENDER"),
-    reason="BLENDER is not set: it is the command line of the Blender executable to test in",
-)
 Open = Callable[..., Window]
 
 
