@@ -1,0 +1,185 @@
+"""Settings of a relight: what is shown, and which files are written."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+from ..relight.present import use
+
+
+def _use_chosen(self: RelightSettings, context: bpy.types.Context) -> None:
+    use(self.id_data)
+
+
+class ArtoGroup(bpy.types.PropertyGroup):
+    """A part of the world's light that gets a layer of its own. Its name is the layer's."""
+
+    mask: PointerProperty(
+        type=bpy.types.Image,
+        name="Painted",
+        description="An image of the HDRI's shape: where it is white, the light is in this group. "
+        "Empty: a round part of the light",
+    )
+    azimuth: FloatProperty(
+        name="Azimuth",
+        description="Where its middle is, counterclockwise from +X as seen from above",
+        subtype="ANGLE",
+        soft_min=-math.pi,
+        soft_max=math.pi,
+    )
+    elevation: FloatProperty(
+        name="Elevation",
+        description="How high its middle is above the horizon",
+        subtype="ANGLE",
+        min=-math.pi / 2,
+        max=math.pi / 2,
+    )
+    radius: FloatProperty(
+        name="Radius",
+        description="How far it reaches from its middle",
+        subtype="ANGLE",
+        min=0.0,
+        max=math.pi,
+        default=math.radians(30),
+    )
+    soft: FloatProperty(
+        name="Soft Edge",
+        description="Over which share of its radius it fades",
+        min=0.0,
+        max=1.0,
+        default=0.1,
+    )
+
+
+class RelightSettings:
+    """What relighting reads."""
+
+    own_lamps: FloatProperty(
+        name="Own Lamps",
+        description="How much of the scene's own lamps and emitters the relit picture has",
+        min=0.0,
+        soft_max=2.0,
+        default=1.0,
+    )
+    denoise: BoolProperty(
+        name="Denoise",
+        description="Denoise the relit picture with Open Image Denoise, steered by the captured "
+        "albedo and normal",
+        default=True,
+    )
+    lamps: BoolProperty(
+        name="Render Lamps",
+        description="Cut suns and lamps out of the world and render their light by itself, "
+        "quickly; the field brings the rest. Only where the world has any",
+        default=True,
+    )
+    lamp_samples: IntProperty(
+        name="Lamp Samples",
+        description="Samples of that render for a world that is all lamps; for one where they have "
+        "a part of the light, that part of the samples",
+        min=1,
+        soft_max=256,
+        default=32,
+    )
+    environment_width: IntProperty(
+        name="World Width",
+        description="Width in pixels that the world is brought to before relighting. Mirrors "
+        "show no more detail than this",
+        min=64,
+        max=16384,
+        default=1024,
+    )
+    look: StringProperty(
+        name="Look",
+        description="Name of the light that the shot is shown in. Each look has a picture and an "
+        "EXR of its own; empty: the scene's only one",
+        default="",
+    )
+    write_data: BoolProperty(
+        name="Write Data",
+        description="Write albedo, normals and depth beside the picture, as 32-bit floats",
+        default=False,
+    )
+    cryptomatte: StringProperty(
+        name="Cryptomatte",
+        description="An EXR of your own render of this shot, whose Cryptomattes go into the data "
+        "file as they are",
+        subtype="FILE_PATH",
+        default="",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    shadows: EnumProperty(
+        name="Shadows",
+        description="How the things of a shot with shadow catchers go into footage",
+        items=[
+            ("MULTIPLY", "Multiply", "As Cycles: the footage times what is left of its light"),
+            (
+                "ADD",
+                "Add Light",
+                "The footage, and the light that the things add to the ground as "
+                "it was modelled or take from it: for a ground that looks like what was filmed",
+            ),
+        ],
+        default="MULTIPLY",
+    )
+    use_in_compositor: EnumProperty(
+        name="Use in Compositor",
+        description="Where the scene's compositor has the relit picture",
+        items=[
+            ("VIEWER", "In a Viewer", "A node beside yours, seen through a viewer"),
+            (
+                "RENDER",
+                "Instead of the Render",
+                "What hangs on the render hangs on it; In a Viewer puts it back",
+            ),
+        ],
+        default="VIEWER",
+        update=_use_chosen,
+    )
+    footage: PointerProperty(
+        type=bpy.types.Image,
+        name="Footage",
+        description="What the things are put into where the scene has shadow catchers: an image, "
+        "a sequence or a movie. Empty: what the camera has behind it, or the compositor",
+    )
+    layers: EnumProperty(
+        name="Layers",
+        description="What else is written of the relit picture: the light of each part of the "
+        "world, and of the scene's own lamps, to be mixed in the compositor",
+        items=[
+            ("OFF", "None", "The picture alone"),
+            ("FACES", "By Direction", "A layer for each face of the hemicube"),
+            ("GROUPS", "By Groups", "A layer for each group of the light, and one for the rest"),
+        ],
+        default="OFF",
+    )
+    groups: CollectionProperty(type=ArtoGroup)
+    active_group: IntProperty()
+    layer_prefix: StringProperty(
+        name="Layer Prefix",
+        description="What the layers' names begin with in the file",
+        default="LG_",
+    )
+    layers_half: BoolProperty(
+        name="Half Float",
+        description="Write the layers as 16-bit floats, as compositing does; else as 32-bit",
+        default=True,
+    )
+    output: StringProperty(
+        name="Relit Picture",
+        description="The relit EXR; empty: beside the .blend, named after it",
+        subtype="FILE_PATH",
+        default="",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
