@@ -5,18 +5,48 @@ from __future__ import annotations
 import bpy
 
 from .job import session
+from .live import live
 from .shot import scene_id, watch
-from .ui import cli, groups, operators, panels, preferences, properties, window
+from .ui import (
+    cli,
+    groups,
+    look_inside,
+    operators,
+    overlay,
+    panels,
+    preferences,
+    properties,
+    result_operators,
+    shot_operators,
+    switches,
+    thumbnails,
+    window,
+)
 
 _CLASSES = (
     *properties.CLASSES,
     *preferences.CLASSES,
+    *switches.CLASSES,
     *operators.CLASSES,
-    *panels.CLASSES,
+    *shot_operators.CLASSES,
+    *result_operators.CLASSES,
+    *look_inside.CLASSES,
     *groups.CLASSES,
+    *panels.CLASSES,
 )
 # In this order; the other way round to unregister.
-_MODULES = (properties, scene_id, watch, session, window, cli)
+_MODULES = (
+    properties,
+    switches,
+    scene_id,
+    watch,
+    session,
+    live,
+    thumbnails,
+    overlay,
+    window,
+    cli,
+)
 
 
 def register() -> None:

@@ -90,6 +90,21 @@ def blocking_render(request: Render) -> None:
     request.state = "cancelled" if ended or "FINISHED" not in result else "done"
 
 
+def part_of(steps: Steps, begin: float, span: float) -> Steps:
+    """The steps of a piece of work that is a part of a larger one: from `begin`, over `span`."""
+    try:
+        while True:
+            step = next(steps)
+            step.share = begin + span * step.share
+            if isinstance(step, Render):
+                step.span *= span
+            yield step
+    except StopIteration as end:
+        return end.value
+    finally:
+        steps.close()
+
+
 def run(steps: Steps, say: Callable[[Progress | Render], None] | None = None) -> Any:
     """Drive the work to its end, blocking; returns what it returns."""
     try:

@@ -16,6 +16,21 @@ from ...core import exr
 from ..work import Render, blocking_render
 from .output import float_exr, write_to
 
+# The kind of node that puts a scene's picture out.
+OUTPUT = "NodeGroupOutput"
+
+
+def compositor(scene: bpy.types.Scene) -> Any:
+    """The tree of a scene's compositor, None where it has none."""
+    return scene.compositing_node_group
+
+
+def own_compositor(copy: bpy.types.Scene, made: list[Any]) -> Any:
+    """The tree of a copied scene's compositor, made its own; noted in `made` where it must go."""
+    copy.compositing_node_group = copy.compositing_node_group.copy()
+    made.append(copy.compositing_node_group)
+    return copy.compositing_node_group
+
 
 class Studio:
     """scene: the borrowed one, with its tree; made: what goes with it; folder: of files."""
@@ -34,12 +49,22 @@ class Studio:
         render.engine = "CYCLES"
         render.resolution_x, render.resolution_y = size
         render.resolution_percentage = 100
-        render.use_compositing = True
-        render.compositor_device, render.compositor_precision = "CPU", "FULL"
-        float_exr(render, multilayer=False)
-        path = self.folder / "composite.exr"
+        return composited(self.scene, text)
+
+
+def composited(scene: bpy.types.Scene, text: str) -> NDArray[np.float32]:
+    """What a scene's compositor puts out, (H, W, 4), scene-linear, in full precision.
+
+    The scene is one to throw away: its settings are changed. Raises CancelledError.
+    """
+    render = scene.render
+    render.use_compositing = True
+    render.compositor_device, render.compositor_precision = "CPU", "FULL"
+    float_exr(render, multilayer=False)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "composite.exr"
         write_to(render, path)
-        request = Render(self.scene.name, 0, text)
+        request = Render(scene.name, 0, text)
         blocking_render(request)
         request.check()
         return next(iter(exr.read(path).values()))

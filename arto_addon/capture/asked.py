@@ -25,7 +25,7 @@ from ..shot import home
 from ..shot.fingerprint import fingerprint, key_of
 from ..shot.shot import shot_of
 from ..stage.bounds import Rendered, rendered
-from ..stage.settings import prepare
+from ..stage.settings import prepare, samples_of
 from ..stage.stage import Stage, picture_region, stage
 from ..stage.takes import THINGS, WHOLE, only_things, take
 from ..work import Steps
@@ -88,7 +88,7 @@ def asked(
             only_things(on.scene.view_layers[0])
         shot = shot_of(scene, view_layer, region)
         decides = {
-            "samples": settings.samples,
+            "samples": samples_of(scene),
             "seed": settings.seed,
             "route": settings.route,
             "grain": grain,

@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import bpy
@@ -18,6 +19,8 @@ from ..blender.nodes import Nodes
 from ..stage.stage import Stage, free_mark
 
 COLLECTION = "ARTO Hemicube"
+# Of a scene's radius: how far away the patches are that an artist looks at.
+VISIBLE = 2.0
 PATTERN = "arto_pattern"
 FAR = 1000.0
 # Patterns stand behind each other, each this much farther out: so near that a patch point keeps its
@@ -253,7 +256,9 @@ def build_for_artist(scene: bpy.types.Scene, hemicube: Hemicube, radius: float) 
     collection.hide_render = True
     scene.collection.children.link(collection)
     images = [(k, "white") for k in range(len(hemicube))]
-    build(collection, hemicube, pattern_set("white"), images, lambda block: block)
+    # where they can be seen: what captures by far ones has the same directions
+    drawn = replace(hemicube, size=min(hemicube.size, VISIBLE * radius))
+    build(collection, drawn, pattern_set("white"), images, lambda block: block)
     collection["arto_hemicube"] = json.dumps(hemicube.to_json())
     collection["arto_radius"] = radius
     return collection

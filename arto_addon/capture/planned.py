@@ -16,6 +16,7 @@ from ...core.hemicube import Hemicube
 from ...core.patterns import pattern_set
 from ...core.refine import check as can_refine
 from ...core.region import Region
+from ..stage.settings import samples_of
 from ..stage.stage import Stage, picture_region
 from ..work import Progress, Steps
 from . import planes, room
@@ -85,7 +86,7 @@ def planned(
         seconds = None
         if on.pace:
             renders = len(plan) * len(tiles)
-            paths_traced = region.pixels * settings.samples * len(plan)
+            paths_traced = region.pixels * samples_of(scene) * len(plan)
             seconds = renders * on.pace.ready + paths_traced * on.pace.path
             seconds += sum(plan) * len(tiles) * on.pace.layer
         one = room.estimate(plan, tiles, len(hemicube), not kept, seconds)

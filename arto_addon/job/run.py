@@ -25,8 +25,11 @@ from ...core.errors import ArtoError, CancelledError, SceneError
 from ..capture.capture import capture
 from ..capture.sequence import capture_frames
 from ..fit import fit
+from ..relight.looks import relight_looks
 from ..relight.many import frames_of, relight_many
 from ..relight.relight import compute
+from ..relight.verify import verify_plate
+from ..shoot import shoot
 from ..shot import home
 from ..work import STOPPED, Progress, Render, run
 from .task import State, Task
@@ -49,7 +52,7 @@ def main(path: Path) -> int:
         with writer.samples():
             result = run(_steps(Task.read(path), folder), writer)
         made = result[0] if isinstance(result, tuple | list) else result
-        state = State(1.0, writer.text, end="done", result=str(made))
+        state = State(1.0, writer.text, end="done", result=str(made or ""))
     except CancelledError as e:
         state, code = State(writer.share, str(e), end="cancelled"), 130
     except ArtoError as e:
@@ -85,7 +88,14 @@ def _steps(task: Task, folder: Path) -> Any:
         return capture_frames(scene, task.view_layer, frames_of(scene))
     if task.verb == "relight_frames":
         return relight_many(scene, task.view_layer, frames=frames_of(scene))
-    work = {"capture": capture, "fit": fit, "relight": compute}[task.verb]
+    work = {
+        "capture": capture,
+        "fit": fit,
+        "relight": compute,
+        "shoot": shoot,
+        "relight_looks": relight_looks,
+        "verify": verify_plate,
+    }[task.verb]
     return work(scene, task.view_layer)
 
 

@@ -7,6 +7,7 @@ folder. So whatever the artist does meanwhile, undo, another file, quitting, doe
 from __future__ import annotations
 
 import contextlib
+import re
 import shutil
 import subprocess
 import sys
@@ -35,6 +36,9 @@ DOING = {
     "relight": "relighting",
     "capture_frames": "capturing the frames of",
     "relight_frames": "relighting the frames of",
+    "shoot": "capturing",
+    "relight_looks": "relighting the looks of",
+    "verify": "verifying the plate of",
 }
 LOG = "log.txt"
 
@@ -45,6 +49,7 @@ class Outcome:
 
     level: str
     text: str
+    verb: str = ""
 
 
 class Job:
@@ -63,7 +68,7 @@ class Job:
         self.blend = bpy.data.filepath
         self.light = scene.arto.look.strip()
         _remove_leftovers(claimed)
-        if not verb.startswith("relight") and (holder := Lock.holder(claimed)):
+        if not verb.startswith(("relight", "verify")) and (holder := Lock.holder(claimed)):
             raise BusyError(
                 f"{claimed} is in use: {holder}; wait until it is done, or end it there"
             )
@@ -132,12 +137,17 @@ class Job:
         shutil.rmtree(self.folder, ignore_errors=True)
 
     @property
+    def spent(self) -> float:
+        """Seconds since it was begun."""
+        return time.monotonic() - self.begun
+
+    @property
     def line(self) -> str:
         """How far it is, in words."""
         if self.told:
             return "stopping"
         left = self.state.left
-        spent = clock(time.monotonic() - self.begun)
+        spent = clock(self.spent)
         return f"{self.state.share:.0%}, " + (f"{clock(left)} left" if left is not None else spent)
 
 
@@ -206,9 +216,9 @@ def _follow() -> float | None:
         text = job.state.text
         if job.state.end == "done" and job.verb in finishers:
             text = finishers[job.verb](job)
-        outcome = Outcome(level, text)
+        outcome = Outcome(level, text, job.verb)
     except Exception as e:
-        outcome = Outcome("ERROR", f"{type(e).__name__}: {e}")
+        outcome = Outcome("ERROR", f"{type(e).__name__}: {e}", job.verb)
         raise
     finally:
         current = None
@@ -240,10 +250,22 @@ def _in_the_middle() -> bool:
     return any(o.bl_idname.startswith(_HANDS) for w in windows for o in w.modal_operators)
 
 
+_RENDERS = re.compile(r"render (\d+) of (\d+): \d+ basis images")
+
+
+def plain(text: str) -> str:
+    """What a job is doing, in an artist's words."""
+    found = _RENDERS.fullmatch(text)
+    if found is None:
+        return text
+    part, parts = found.groups()
+    return "rendering" if parts == "1" else f"rendering, part {part} of {parts}"
+
+
 def _show_share(job: Job | None) -> None:
     text = None
     if job:
-        text = f"ARTO is {DOING[job.verb]}: {job.state.text}, {job.line}   (ESC: cancel)"
+        text = f"{busy()}: {plain(job.state.text)}, {job.line}   (ESC: cancel)"
     for window in bpy.context.window_manager.windows:
         # a timer has no window of its own after a file was opened, and Blender asks for one here
         with bpy.context.temp_override(window=window):

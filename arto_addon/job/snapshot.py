@@ -34,7 +34,7 @@ def take(folder: Path, verb: str, scene: bpy.types.Scene, view_layer: str) -> tu
             compress=False,
             check_existing=False,
         )
-        painted = tuple(_painted(image, folder) for image in bpy.data.images if _in_no_file(image))
+        painted = tuple(_painted(image, folder) for image in bpy.data.images if in_no_file(image))
         _link_caches(folder)
         task = Task(verb, scene.name, view_layer, bpy.data.filepath, _devices(), painted)
         return blend, task.write(folder)
@@ -47,7 +47,8 @@ def take(folder: Path, verb: str, scene: bpy.types.Scene, view_layer: str) -> tu
         bpy.data.use_autopack = packing
 
 
-def _in_no_file(image: bpy.types.Image) -> bool:
+def in_no_file(image: bpy.types.Image) -> bool:
+    """Whether an image was painted and not saved. Raises SceneError for one with tiles."""
     if not image.is_dirty or image.source not in {"FILE", "GENERATED", "TILED"}:
         return False
     if image.source == "TILED":
@@ -58,12 +59,18 @@ def _in_no_file(image: bpy.types.Image) -> bool:
     return True
 
 
-def _painted(image: bpy.types.Image, folder: Path) -> Painted:
+def painted_pixels(image: bpy.types.Image, folder: Path) -> str:
+    """Write an image's pixels into a folder -> the name of the .npy."""
     pixels = np.empty(len(image.pixels), np.float32)
     image.pixels.foreach_get(pixels)
     name = f"painted_{image.session_uid}.npy"
     np.save(folder / name, pixels)
-    return Painted(image.name, image.library.filepath if image.library else "", name)
+    return name
+
+
+def _painted(image: bpy.types.Image, folder: Path) -> Painted:
+    library = image.library.filepath if image.library else ""
+    return Painted(image.name, library, painted_pixels(image, folder))
 
 
 def _link_caches(folder: Path) -> None:

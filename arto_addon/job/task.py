@@ -16,7 +16,10 @@ from ...core.files import write_text
 
 TASK = "task.json"
 PROGRESS = "progress.json"
-VERBS = ("capture", "fit", "relight", "capture_frames", "relight_frames")
+VERBS = (
+    "capture", "fit", "relight", "capture_frames", "relight_frames", "shoot", "relight_looks",
+    "verify",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

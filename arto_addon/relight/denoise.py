@@ -24,6 +24,16 @@ from .plate import mixed
 _available: list[bool] = []
 
 
+def known() -> bool | None:
+    """Whether this Blender says that it denoises, at once: a panel cannot try it. None where
+    nothing is known."""
+    try:
+        import _cycles
+    except ImportError:
+        return None
+    return getattr(_cycles, "with_openimagedenoise", None)
+
+
 def available() -> bool:
     """Whether this Blender really denoises."""
     if not _available:

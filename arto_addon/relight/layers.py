@@ -25,6 +25,7 @@ from ..work import Progress, Steps
 from ..world import kept
 from ..world.lamp_render import lamp_light, lamp_samples
 from . import denoise
+from .own import gains_of
 from .plate import layers_file
 
 if TYPE_CHECKING:
@@ -115,13 +116,16 @@ def of_plate(shot: Shown, ready: Ready) -> Steps:
                 samples = lamp_samples(scene, share * ready.found.share)
                 light = yield from lamp_light(scene, field, mine, samples, 0.9)
             found[name] = found[name] + light
-    if scene.arto.own_lamps and shown.own.any():
-        left, scale = shown.own, np.float32(scene.arto.own_lamps)
+    own = field.layer("own")
+    if scene.arto.own_lamps and own.any():
+        left, scale = own, np.float32(scene.arto.own_lamps)
+        gains = gains_of(scene.arto)
         for name in field.own_layers:
-            found[name] = scale * field.layer(name)
+            gain = np.float32(gains.get(name.removeprefix("own_"), 1.0))
+            found[name] = scale * gain * field.layer(name)
             left = left - field.layer(name)
         # of no group; what is left of sums by rounding is nothing
-        found[OWN] = scale * np.where(left > 1e-5 * shown.own, left, 0)
+        found[OWN] = scale * np.where(left > 1e-5 * own, left, 0)
     if scene.arto.denoise and denoise.available():
         clean = denoise.clean(field)
         for name, picture in found.items():

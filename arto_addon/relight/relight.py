@@ -31,8 +31,9 @@ from ..world import kept
 from ..world.background import background, background_with_holes, holds_out
 from ..world.check import check_world, differs_by_rays
 from ..world.lamp_render import brightness, lamp_light, lamp_samples, region_of
-from . import denoise, layers, plate
+from . import denoise, layers, light_key, plate
 from .footage import footage
+from .own import own_of
 from .present import present
 
 # From this share of the light on the lamps are the picture, and what the field adds is denoised
@@ -129,10 +130,6 @@ class Shown:
     @cached_property
     def guides(self) -> dict[str, NDArray]:
         return denoise.guides_of(self.field)
-
-    @cached_property
-    def own(self) -> NDArray[np.float32]:
-        return self.field.layer("own")
 
 
 def relight(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
@@ -275,6 +272,7 @@ def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> S
     yield Progress(0.9, f"writing {path}")
     about = {"scene": scene.name, "world": ready.world.name, "denoised": denoised}
     about["lamps"] = ready.lamps
+    about[light_key.HEADER.removeprefix("arto.")] = light_key.light_key(scene, ready.world)
     if scene.render.film_transparent and scene.cycles.film_transparent_glass:
         glass = "opaque: what is seen through it is in it, whatever Transparent Glass says"
         about["glass"] = glass
@@ -316,7 +314,7 @@ def _with_own(
     scene's own lamps, and of the lamps of the world."""
     if shown.held:
         yield from _hold(shown, ready.whole, picture, parts)
-    picture[..., :3] += np.float32(shown.scene.arto.own_lamps) * shown.own
+    picture[..., :3] += own_of(shown.scene, shown.field)
     parts = [*parts, picture[..., :3]]
     return [sum(parts)] if ready.together else parts
 
@@ -354,7 +352,9 @@ def _lamps(shown: Shown, found: Split) -> Steps:
         samples = lamp_samples(shown.scene, found.share)
         lamps = f"{found.share:.0%} of the world's light, {samples} samples"
         yield Progress(0.2, f"the world's lamps: {lamps}")
+        begun = time.perf_counter()
         light = yield from lamp_light(shown.scene, shown.field, found.lamps, samples, 0.3)
+        lamps += f", {time.perf_counter() - begun:.0f} s"
         return [light], lamps, found.share >= NEARLY_ALL
     yield Progress(0.3, f"the world's lamps: {lamps}")
     return [], lamps, False

@@ -85,16 +85,23 @@ def fingerprint(
 
 
 def of_blocks(
-    roots: Iterable[bpy.types.ID], then: Fingerprint | None = None, full: bool = False
+    roots: Iterable[bpy.types.ID],
+    then: Fingerprint | None = None,
+    full: bool = False,
+    without: Iterable[bpy.types.NodeSocket] = (),
 ) -> Fingerprint:
-    """The fingerprint of some data-blocks and all that they point to; see `fingerprint`."""
+    """The fingerprint of some data-blocks and all that they point to; see `fingerprint`.
+
+    without: sockets whose values do not count.
+    """
+    passed = {(socket.as_pointer(), type(socket)) for socket in without}
     then, out = then or {}, {}
     queue = list(roots)
     seen = {block.session_uid for block in queue}
     while queue:
         block = queue.pop()
         name = _words(block)
-        looked = walk.Walk(block)
+        looked = walk.Walk(block, passed)
         digest = looked.digest
         if isinstance(block, _GEOMETRY):
             if block.session_uid not in _arrays:

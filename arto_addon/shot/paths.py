@@ -285,9 +285,11 @@ def relit_name(scene: bpy.types.Scene, look: str | None = None) -> str:
 _PLAIN = "relit"  # a plate's ending without a look
 
 
-def relit_file(scene: bpy.types.Scene) -> Path:
-    """The plate's EXR. Raises SceneError for a .blend that was never saved."""
-    look, name = scene.arto.look.strip(), relit_name(scene)
+def relit_file(scene: bpy.types.Scene, look: str | None = None) -> Path:
+    """The plate's EXR. look: that it is of (default: the scene's now). Raises SceneError for a
+    .blend that was never saved."""
+    look = scene.arto.look.strip() if look is None else look
+    name = relit_name(scene, look)
     mark = f"~{name.rpartition('~')[2]}" if "~" in name else ""
     if scene.arto.output:
         path = home.absolute(scene.arto.output)

@@ -126,6 +126,34 @@ def _capture_set(place: Place) -> CaptureSet | Line | None:
     return there or ("damaged, or of another version: capture again", False)
 
 
+def capture_at(header: Path) -> CaptureSet | None:
+    """The capture set whose description that is; None where it is not there, or damaged."""
+    try:
+        return _opened(CaptureSet, header, unfinished=True)
+    except OSError:
+        return None
+
+
+def field_of(source: Path) -> Field | None:
+    """The field in a shot's folder; None where it is not there, or damaged."""
+    try:
+        return _opened(Field, source / "field" / field.HEADER)
+    except OSError:
+        return None
+
+
+_sizes: dict[Path, tuple[float, int]] = {}
+
+
+def disk(folder: Path) -> int:
+    """Bytes in a folder, looked at once every few seconds; 0 where it is not there."""
+    at, found = _sizes.get(folder, (-10.0, 0))
+    if bpy.app.background or time.monotonic() - at > 3:
+        found = sum(f.stat().st_size for f in folder.rglob("*") if f.is_file())
+        _sizes[folder] = time.monotonic(), found
+    return found
+
+
 def field_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line | None:
     """What there is of a field, and whether it serves the shot as it is; None for nothing."""
     place = _place(scene, view_layer)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +23,12 @@ def _names(text: str) -> set[str]:
     return set(text.split())
 
 
-# Blender's own, and what changes by being looked at.
+# Blender's own and ours, and what changes by being looked at.
 _NEVER = _names("""
     rna_type name name_full original session_uid users tag is_evaluated use_fake_user
     use_extra_user preview asset_data override_library library library_weak_reference
     animation_data id_data update_tag runtime_flag annotation grease_pencil bindcode depsgraph
-    pixels execution_time persistent_uid is_runtime_data filepath_raw
+    pixels execution_time persistent_uid is_runtime_data filepath_raw arto
 """)
 # Of an editor and not of the picture.
 _SCREEN = _names("""
@@ -82,12 +82,13 @@ _CUSTOM = (bpy.types.Object, bpy.types.Mesh, bpy.types.Material, bpy.types.Camer
 
 
 class Walk:
-    """One data-block's digest, and what it points to."""
+    """One data-block's digest, and what it points to. passed: what of it does not count, by pointer
+    and type."""
 
-    def __init__(self, block: bpy.types.ID) -> None:
+    def __init__(self, block: bpy.types.ID, passed: Iterable[tuple[int, type]] = ()) -> None:
         self._hash = hashlib.blake2b(digest_size=12)
         self.found: list[bpy.types.ID] = []
-        self._seen: set[tuple[int, type]] = set()
+        self._seen: set[tuple[int, type]] = set(passed)
         self._struct(block, 0)
 
     @property

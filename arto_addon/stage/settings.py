@@ -63,7 +63,7 @@ def prepare(on: Stage, layers: int) -> None:
     """Switch off on the stage whatever would bend the light or take it apart."""
     s = on.scene.arto
     through = on.scene.cycles.transparent_max_bounces + layers
-    words = {SAMPLES: s.samples, SEED: s.seed, THROUGH: through}
+    words = {SAMPLES: samples_of(on.scene), SEED: s.seed, THROUGH: through}
     for change in CHANGES:
         on.change(change.setting, words.get(change.to, change.to))
     layer = on.scene.view_layers[0]
@@ -74,6 +74,22 @@ def prepare(on: Stage, layers: int) -> None:
     on.changed["world"] = [on.scene.world.name if on.scene.world else None, None]
     on.scene.world = world
     layer.world_override = None
+
+
+# What a scene's own samples are multiplied by; with a noise threshold few pixels take them all.
+QUALITIES = {"DRAFT": 0.25, "GOOD": 1.0, "FINAL": 4.0}
+MOST_ADAPTIVE = 256
+
+
+def samples_of(scene: bpy.types.Scene) -> int:
+    """The samples of a capture, by the quality that the artist chose."""
+    s, cycles = scene.arto, scene.cycles
+    # a file from before there was a choice, or a script, says how many
+    told = s.is_property_set("samples") and not s.is_property_set("quality")
+    if s.quality == "CUSTOM" or told:
+        return s.samples
+    own = min(cycles.samples, MOST_ADAPTIVE) if cycles.use_adaptive_sampling else cycles.samples
+    return max(1, round(own * QUALITIES[s.quality]))
 
 
 def looks_otherwise(scene: bpy.types.Scene) -> list[str]:

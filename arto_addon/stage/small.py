@@ -42,15 +42,15 @@ def small(on: Stage, samples: int) -> Iterator[None]:
             setattr(owner, name, value)
 
 
-def parts_of(on: Stage, text: str, share: float = 0.0) -> Steps:
+def parts_of(on: Stage, text: str, share: float = 0.0, span: float = 0.0) -> Steps:
     """Render the stage as it stands -> its parts by name, `exr.read`. Raises CancelledError.
 
-    share: how far the whole work is.
+    share: how far the whole work is; span: how much of it this is.
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "small.exr"
         write_to(on.scene.render, path)
-        request = Render(on.scene.name, share, text)
+        request = Render(on.scene.name, share, text, span)
         with _timed() as laps:
             yield request
         request.check()

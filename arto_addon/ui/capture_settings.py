@@ -51,6 +51,11 @@ def _preset_chosen(self: CaptureSettings, context: bpy.types.Context) -> None:
             self["adaptive"] = False
 
 
+def _samples_chosen(self: CaptureSettings, context: bpy.types.Context) -> None:
+    # who says how many samples wants these: scripts say nothing else
+    self.quality = "CUSTOM"
+
+
 class CaptureSettings:
     """What capture and fit read."""
 
@@ -143,12 +148,25 @@ class CaptureSettings:
         "does not take noise for narrow reflections",
         default=False,
     )
+    quality: EnumProperty(
+        name="Quality",
+        description="Samples of the capture, as a multiple of the scene's own (of no more than 256 "
+        "where it has a noise threshold). Their noise is the main error of the relit picture",
+        items=[
+            ("DRAFT", "Draft", "A quarter of the scene's own samples"),
+            ("GOOD", "Good", "As many samples as the scene's own"),
+            ("FINAL", "Final", "Four times the scene's own samples"),
+            ("CUSTOM", "Custom", "A number of samples of your own"),
+        ],
+        default="GOOD",
+    )
     samples: IntProperty(
         name="Samples",
-        description="Samples of the capture. Its noise is the main error of the relit picture",
+        description="Samples of the capture where its quality is Custom",
         min=1,
         max=1 << 20,
         default=128,
+        update=_samples_chosen,
     )
     seed: IntProperty(name="Seed", description="Seed of the capture's noise", min=0, default=0)
     memory: IntProperty(

@@ -19,6 +19,7 @@ from ..farm.part import render_part, save_part
 from ..farm.plan import plan
 from ..fit import fit
 from ..job import run as job
+from ..live import maps
 from ..relight.many import relight_frames, relight_many
 from ..relight.relight import relight
 from ..shot import paths
@@ -95,6 +96,7 @@ def _parser() -> argparse.ArgumentParser:
         )
     # what the window starts
     jobs.add_parser("job").add_argument("task", type=Path)
+    jobs.add_parser("maps")
     return parser
 
 
@@ -132,6 +134,8 @@ def main(arguments: list[str]) -> int:
     verb = options.pop("verb")
     if verb == "job":
         return job.main(options["task"])
+    if verb == "maps":
+        return maps.serve()
     if verb in ("part", "gather"):
         return _of_a_farm(verb, options)
     name, layer = options.pop("scene"), options.pop("view_layer")

@@ -1,10 +1,8 @@
-"""Groups of the world's light, which get layers of their own: their list and panel."""
+"""Groups of the world's light, which get layers of their own: their list."""
 
 from __future__ import annotations
 
 import bpy
-
-from .panels import Panel
 
 
 class ARTO_UL_groups(bpy.types.UIList):
@@ -55,38 +53,4 @@ class ARTO_OT_remove_group(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ARTO_PT_layers(Panel, bpy.types.Panel):
-    bl_label = "Layers and Footage"
-    bl_parent_id = "ARTO_PT_main"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def draw(self, context: bpy.types.Context) -> None:
-        column, settings = self.column(), context.scene.arto
-        column.prop(settings, "layers")
-        if settings.layers == "GROUPS":
-            row = column.row()
-            row.template_list(
-                "ARTO_UL_groups", "", settings, "groups", settings, "active_group", rows=3
-            )
-            buttons = row.column(align=True)
-            buttons.operator("arto.add_group", text="", icon="ADD")
-            buttons.operator("arto.remove_group", text="", icon="REMOVE")
-            if 0 <= settings.active_group < len(settings.groups):
-                group = settings.groups[settings.active_group]
-                column.prop(group, "mask")
-                if not group.mask:
-                    for name in ("azimuth", "elevation", "radius", "soft"):
-                        column.prop(group, name)
-        if settings.layers != "OFF":
-            column.prop(settings, "layer_prefix")
-            column.prop(settings, "layers_half")
-            column.operator("arto.mix_to_scene", icon="WORLD_DATA")
-        column.prop(settings, "write_data")
-        if settings.write_data:
-            column.prop(settings, "cryptomatte")
-        column.prop(settings, "footage")
-        column.prop(settings, "shadows")
-        column.prop(settings, "use_in_compositor")
-
-
-CLASSES = (ARTO_UL_groups, ARTO_OT_add_group, ARTO_OT_remove_group, ARTO_PT_layers)
+CLASSES = (ARTO_UL_groups, ARTO_OT_add_group, ARTO_OT_remove_group)

@@ -29,14 +29,14 @@ from ..world.check import check_world, world_of
 from .long_work import LongWork
 
 
-def _free(cls: type) -> bool:
+def free(cls: type) -> bool:
     """Whether nothing of ARTO's runs; a button that has to wait says what for."""
     if text := session.busy():
         cls.poll_message_set(text)
     return not text
 
 
-class _Quick(bpy.types.Operator):
+class Quick(bpy.types.Operator):
     """An operator that ends at once; typed errors become reports."""
 
     def work(self, context: bpy.types.Context) -> str:
@@ -51,7 +51,7 @@ class _Quick(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ARTO_OT_build_hemicube(_Quick):
+class ARTO_OT_build_hemicube(Quick):
     """Build the hemicube of light patches around the scene, to look at. It is not rendered; \
 capturing uses its geometry"""
 
@@ -64,7 +64,7 @@ capturing uses its geometry"""
         if bpy.app.is_job_running("RENDER"):
             cls.poll_message_set("Blender is rendering: wait until it is done")
             return False
-        return _free(cls)
+        return free(cls)
 
     def work(self, context: bpy.types.Context) -> str:
         scene = context.scene
@@ -72,13 +72,15 @@ capturing uses its geometry"""
             centre, radius = scene_bounds(on)
         hemicube = planes.wanted(scene, centre, radius)
         planes.build_for_artist(scene, hemicube, radius)
+        if not bpy.app.background:
+            context.window_manager.arto.overlay = True
         return (
             f"{len(hemicube)} patches at {hemicube.size:.4g} around a scene of radius "
             f"{radius:.4g}: parallax {hemicube.parallax_degrees(radius):.2g} degrees"
         )
 
 
-class ARTO_OT_remove_hemicube(_Quick):
+class ARTO_OT_remove_hemicube(Quick):
     """Remove the hemicube from the scene"""
 
     bl_idname = "arto.remove_hemicube"
@@ -90,21 +92,21 @@ class ARTO_OT_remove_hemicube(_Quick):
         if planes.of_artist(context.scene) is None:
             cls.poll_message_set("There is no hemicube in this scene")
             return False
-        return _free(cls)
+        return free(cls)
 
     def work(self, context: bpy.types.Context) -> str:
         planes.remove_for_artist(context.scene)
         return "removed the hemicube"
 
 
-def _can_capture(cls: type, context: bpy.types.Context) -> bool:
+def can_capture(cls: type, context: bpy.types.Context) -> bool:
     if context.scene.render.engine != "CYCLES":
         cls.poll_message_set("ARTO captures with Cycles: choose it as the render engine")
         return False
     if context.scene.camera is None:
         cls.poll_message_set("The scene has no camera")
         return False
-    return _free(cls)
+    return free(cls)
 
 
 class ARTO_OT_capture(LongWork):
@@ -116,7 +118,7 @@ class ARTO_OT_capture(LongWork):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _can_capture(cls, context)
+        return can_capture(cls, context)
 
     @classmethod
     def description(cls, context: bpy.types.Context, properties: object) -> str:
@@ -139,7 +141,7 @@ class ARTO_OT_fit(LongWork):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _free(cls) and _there(
+        return free(cls) and there(
             cls, context, "capture", CAPTURE_HEADER, "Capture the scene first"
         )
 
@@ -156,10 +158,7 @@ class ARTO_OT_relight(LongWork):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if world_of(context.scene) is None:
-            cls.poll_message_set("The scene has no world to relight with: add one with an HDRI")
-            return False
-        return _free(cls) and _there(cls, context, "field", FIELD_HEADER, "Fit the capture first")
+        return free(cls) and can_relight(cls, context)
 
     def check(self, scene: bpy.types.Scene) -> None:
         check_world(scene)
@@ -178,7 +177,7 @@ class ARTO_OT_capture_frames(LongWork):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _can_capture(cls, context)
+        return can_capture(cls, context)
 
     def check(self, scene: bpy.types.Scene) -> None:
         check_scene(scene)
@@ -200,7 +199,7 @@ whose frames were captured, or of an animated world over a still"""
         if world_of(context.scene) is None:
             cls.poll_message_set("The scene has no world to relight with: add one with an HDRI")
             return False
-        return _free(cls)
+        return free(cls)
 
     def check(self, scene: bpy.types.Scene) -> None:
         check_world(scene)
@@ -210,7 +209,15 @@ whose frames were captured, or of an animated world over a still"""
         return relight_frames(scene, view_layer, frames_of(scene))
 
 
-def _there(cls: type, context: bpy.types.Context, folder: str, name: str, say: str) -> bool:
+def can_relight(cls: type, context: bpy.types.Context) -> bool:
+    """Whether there is a world, and a capture to show in it."""
+    if world_of(context.scene) is None:
+        cls.poll_message_set("The scene has no world to relight with: add one with an HDRI")
+        return False
+    return there(cls, context, "field", FIELD_HEADER, "Capture the shot first")
+
+
+def there(cls: type, context: bpy.types.Context, folder: str, name: str, say: str) -> bool:
     """Whether a file of the shot's is on disk; else say what to do first."""
     scene = context.scene
     try:
@@ -223,7 +230,7 @@ def _there(cls: type, context: bpy.types.Context, folder: str, name: str, say: s
     return there
 
 
-class ARTO_OT_cancel(_Quick):
+class ARTO_OT_cancel(Quick):
     """End what ARTO is doing; finished tiles are kept"""
 
     bl_idname = "arto.cancel"
@@ -238,7 +245,7 @@ class ARTO_OT_cancel(_Quick):
         return "ARTO is stopping"
 
 
-class ARTO_OT_adopt(_Quick):
+class ARTO_OT_adopt(Quick):
     """Work with what was captured for another file or scene; it is kept for that one too"""
 
     bl_idname = "arto.adopt"
@@ -247,7 +254,7 @@ class ARTO_OT_adopt(_Quick):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _free(cls)
+        return free(cls)
 
     def work(self, context: bpy.types.Context) -> str:
         scene, layer = context.scene, layer_of(context.scene)
@@ -258,7 +265,7 @@ class ARTO_OT_adopt(_Quick):
         return f"what was captured for {place.owner} is used here too, in {folder}"
 
 
-class ARTO_OT_discard_unfinished(_Quick):
+class ARTO_OT_discard_unfinished(Quick):
     """Remove the captures of this shot that were stopped, with their finished tiles"""
 
     bl_idname = "arto.discard_unfinished"
@@ -266,7 +273,7 @@ class ARTO_OT_discard_unfinished(_Quick):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _free(cls)
+        return free(cls)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return context.window_manager.invoke_confirm(self, event)
@@ -290,7 +297,7 @@ class ARTO_OT_discard_unfinished(_Quick):
         return f"removed {gone} unfinished captures" if gone else "there is none unfinished"
 
 
-class ARTO_OT_mix_to_scene(_Quick):
+class ARTO_OT_mix_to_scene(Quick):
     """Give the scene a world and lamps that render as the mix of layers in its compositor looks"""
 
     bl_idname = "arto.mix_to_scene"
@@ -299,7 +306,7 @@ class ARTO_OT_mix_to_scene(_Quick):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _free(cls)
+        return free(cls)
 
     def work(self, context: bpy.types.Context) -> str:
         return f"wrote {mix_to_scene(context.scene)}, and the scene has it as its world"

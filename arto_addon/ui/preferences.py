@@ -21,14 +21,28 @@ class ArtoPreferences(bpy.types.AddonPreferences):
         default=False,
     )
 
+    research: BoolProperty(
+        name="Research Options",
+        description="Show the panel Method in the render properties: patches, patterns and "
+        "supports, and capture and fit apart",
+        default=False,
+    )
+
     def draw(self, context: bpy.types.Context) -> None:
         self.layout.prop(self, "run_here")
+        self.layout.prop(self, "research")
 
 
 def run_here(context: bpy.types.Context) -> bool:
     """Whether work runs in this process."""
     addon = context.preferences.addons.get(ADDON)
     return bool(addon and addon.preferences and addon.preferences.run_here)
+
+
+def research(context: bpy.types.Context) -> bool:
+    """Whether the method's own words are shown."""
+    addon = context.preferences.addons.get(ADDON)
+    return bool(addon and addon.preferences and addon.preferences.research)
 
 
 CLASSES = (ArtoPreferences,)

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import PointerProperty, StringProperty
 
 from .capture_settings import CaptureSettings
-from .relight_settings import ArtoGroup, RelightSettings
+from .relight_settings import ArtoGroup, ArtoLamps, ArtoLook, RelightSettings
 
 
 class ArtoSettings(CaptureSettings, RelightSettings, bpy.types.PropertyGroup):
@@ -26,7 +26,7 @@ HEMICUBE = (
     "preset", "faces", "half_sides", "patches", "adaptive", "align", "rotation", "far", "size",
 )  # fmt: skip
 CAPTURE = (
-    "samples", "patterns", "grain", "route", "seed", "memory", "keep", "keep_limit",
+    "samples", "quality", "patterns", "grain", "route", "seed", "memory", "keep", "keep_limit",
 )  # fmt: skip
 FIT = ("support", "separate")
 RELIGHT = (
@@ -34,7 +34,7 @@ RELIGHT = (
     "layers", "layer_prefix", "layers_half", "write_data", "cryptomatte", "shadows",
 )  # fmt: skip
 
-CLASSES = (ArtoGroup, ArtoSettings)
+CLASSES = (ArtoGroup, ArtoLook, ArtoLamps, ArtoSettings)
 
 
 def register() -> None:

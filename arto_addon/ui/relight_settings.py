@@ -15,6 +15,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from ..relight import compare, looks
 from ..relight.present import use
 
 
@@ -62,12 +63,42 @@ class ArtoGroup(bpy.types.PropertyGroup):
     )
 
 
+class ArtoLook(bpy.types.PropertyGroup):
+    """A light that the shot is shown in. Its name is that of its plate."""
+
+    world: PointerProperty(
+        type=bpy.types.World, name="World", description="The world that lights this look"
+    )
+
+
+class ArtoLamps(bpy.types.PropertyGroup):
+    """A light group of the scene's own lamps. Its name is the group's."""
+
+    show: BoolProperty(name="Show", description="Whether these lamps are lit", default=True)
+    gain: FloatProperty(
+        name="Gain",
+        description="How much of these lamps' light is shown, as a factor of what was captured",
+        min=0.0,
+        soft_max=4.0,
+        default=1.0,
+    )
+
+
+def _look_chosen(self: RelightSettings, context: bpy.types.Context) -> None:
+    looks.show(self.id_data)
+
+
+def _compare_chosen(self: RelightSettings, context: bpy.types.Context) -> None:
+    compare.update(self.id_data)
+
+
 class RelightSettings:
     """What relighting reads."""
 
     own_lamps: FloatProperty(
-        name="Own Lamps",
-        description="How much of the scene's own lamps and emitters the relit picture has",
+        name="Scene Lamps",
+        description="How much of the light of the scene's own lamps, and of what emits in it, the "
+        "relit picture has, as a factor",
         min=0.0,
         soft_max=2.0,
         default=1.0,
@@ -79,15 +110,15 @@ class RelightSettings:
         default=True,
     )
     lamps: BoolProperty(
-        name="Render Lamps",
-        description="Cut suns and lamps out of the world and render their light by itself, "
-        "quickly; the field brings the rest. Only where the world has any",
+        name="Render the HDRI's Suns",
+        description="Cut suns and bright lamps out of the HDRI and render their light by itself, "
+        "quickly, for sharp shadows; the capture brings the rest. Off: all from the capture",
         default=True,
     )
     lamp_samples: IntProperty(
-        name="Lamp Samples",
-        description="Samples of that render for a world that is all lamps; for one where they have "
-        "a part of the light, that part of the samples",
+        name="Sun Samples",
+        description="Samples of that render for an HDRI that is all suns and lamps; for one where "
+        "they have a part of the light, that part of the samples",
         min=1,
         soft_max=256,
         default=32,
@@ -147,6 +178,27 @@ class RelightSettings:
         default="VIEWER",
         update=_use_chosen,
     )
+    compare: EnumProperty(
+        name="Compare",
+        description="The plate beside the last render of this scene, in the image editor",
+        items=[
+            ("OFF", "Plate", "The plate alone"),
+            ("SIDE", "Side by Side", "Left half of the plate, right half of the render"),
+            ("WIPE", "Wipe", "The plate up to the wipe, the render beyond it"),
+            ("RENDER", "Render", "The render alone"),
+        ],
+        default="OFF",
+        update=_compare_chosen,
+    )
+    wipe: FloatProperty(
+        name="Wipe",
+        description="Where the plate ends and the render begins, as a share of the width",
+        min=0.0,
+        max=1.0,
+        default=0.5,
+        subtype="FACTOR",
+        update=_compare_chosen,
+    )
     footage: PointerProperty(
         type=bpy.types.Image,
         name="Footage",
@@ -163,6 +215,18 @@ class RelightSettings:
             ("GROUPS", "By Groups", "A layer for each group of the light, and one for the rest"),
         ],
         default="OFF",
+    )
+    looks: CollectionProperty(type=ArtoLook)
+    active_look: IntProperty(
+        name="Look", description="The light that the shot is shown in", update=_look_chosen
+    )
+    own_groups: CollectionProperty(type=ArtoLamps)
+    active_own_group: IntProperty()
+    live_finish: BoolProperty(
+        name="Finish When Resting",
+        description="While Live is on and the light is left alone for two seconds, relight the "
+        "shot as the button does: with the HDRI's suns, and denoised",
+        default=True,
     )
     groups: CollectionProperty(type=ArtoGroup)
     active_group: IntProperty()

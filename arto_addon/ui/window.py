@@ -9,55 +9,101 @@ import bpy
 
 from ..job import session
 from ..job.session import Job
+from ..live import live
+from ..relight import compare, own
 from ..relight.many import frames_of
+from ..relight.plate import show
 from ..relight.present import present, present_frames
+from ..relight.verify import verify_file
+from ..shot import paths
+from ..shot.shot import layer_of
+from ..shot.status import field_of
+from .reveal import reveal
 
 _keys: list[tuple[Any, Any]] = []
+
+
+def _scene_of(job: Job) -> bpy.types.Scene | None:
+    """The scene of a job, if its file is still open."""
+    scene = next((s for s in bpy.data.scenes if s.arto.scene_id == job.scene_id), None)
+    return scene if bpy.data.filepath == job.blend else None
 
 
 def show_relit(job: Job) -> str:
     """A relight has ended: put the plate, or its frames, into the file, if that is still open, and
     show it."""
     path = Path(job.state.result)
-    scene = next((s for s in bpy.data.scenes if s.arto.scene_id == job.scene_id), None)
-    if scene is None or bpy.data.filepath != job.blend:
+    scene = _scene_of(job)
+    if scene is None:
         return f"wrote {path} (its scene is not open any more)"
     window = bpy.context.window_manager.windows[0]
+    wanted = live.wrote(path)
     with bpy.context.temp_override(window=window):
         if job.verb == "relight_frames":
-            reveal(present_frames(scene, path, frames_of(scene), job.light))
+            image = present_frames(scene, path, frames_of(scene), job.light)
         else:
-            reveal(present(scene, path, job.light))
+            image = present(scene, path, job.light)
+        if wanted:  # else the hand has moved on, and looks at something newer
+            reveal(image)
     return job.state.text
 
 
-def reveal(image: bpy.types.Image) -> None:
-    """Show an image in an image editor that is open, else where a render would be shown."""
-    area = _editor()
-    if area is None:
-        bpy.ops.render.view_show("INVOKE_DEFAULT")
-        area = _editor()
-    if area is not None:
-        area.spaces.active.image = image
-        area.tag_redraw()
+def show_captured(job: Job) -> str:
+    """A capture has ended: its light groups come into the panel, and the shot in its light into the
+    window."""
+    scene = _scene_of(job)
+    if scene is not None:
+        there = field_of(paths.place(scene, layer_of(scene)).source)
+        if there is not None:
+            own.sync(scene, there)
+    if job.verb == "shoot" and job.state.result:
+        return show_relit(job)
+    return job.state.text
 
 
-def _editor() -> bpy.types.Area | None:
-    """The image editor to show a picture in: one that shows a picture already comes first."""
-    found = []
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "IMAGE_EDITOR" and area.ui_type == "IMAGE_EDITOR":
-                space = area.spaces.active
-                shown = space.image
-                ours = shown is None or shown.type == "RENDER_RESULT" or "ARTO" in shown.name
-                if space.mode == "VIEW":
-                    found.append((not ours, -area.width * area.height, area))
-    return min(found, key=lambda f: f[:2])[2] if found else None
+def show_looks(job: Job) -> str:
+    """All looks were relit: each has its image and its node."""
+    scene = _scene_of(job)
+    if scene is None:
+        return job.state.text
+    window = bpy.context.window_manager.windows[0]
+    shown = None
+    with bpy.context.temp_override(window=window):
+        for look in scene.arto.looks:
+            path = paths.relit_file(scene, look.name)
+            if path.is_file():
+                image = present(scene, path, look.name)
+                if shown is None or look.name == scene.arto.look:
+                    shown = image
+        if shown is not None:
+            reveal(shown)
+    return job.state.text
+
+
+def show_verified(job: Job) -> str:
+    """Show where the plate is off."""
+    scene = _scene_of(job)
+    path = Path(job.state.result)
+    if scene is not None and path == verify_file(paths.relit_file(scene)):
+        window = bpy.context.window_manager.windows[0]
+        with bpy.context.temp_override(window=window):
+            reveal(show(path, "ARTO Verify"))
+    return job.state.text
+
+
+_FINISHERS = {
+    "relight": show_relit,
+    "relight_frames": show_relit,
+    "relight_looks": show_looks,
+    "capture": show_captured,
+    "shoot": show_captured,
+    "fit": show_captured,
+    "verify": show_verified,
+}
 
 
 def register() -> None:
-    session.finishers["relight"] = session.finishers["relight_frames"] = show_relit
+    session.finishers.update(_FINISHERS)
     keys = bpy.context.window_manager.keyconfigs.addon
     if keys:  # none without a window
         # the last one to be asked: whatever else takes an ESC has it first
@@ -66,8 +112,9 @@ def register() -> None:
 
 
 def unregister() -> None:
-    session.finishers.pop("relight", None)
-    session.finishers.pop("relight_frames", None)
+    for verb in _FINISHERS:
+        session.finishers.pop(verb, None)
+    compare.forget()
     while _keys:
         keymap, item = _keys.pop()
         keymap.keymap_items.remove(item)

@@ -8,6 +8,8 @@ that refracts with an index of 1: what comes through is the world as the scene's
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import bpy
@@ -25,6 +27,8 @@ from .studio import studio_scene
 
 # The least samples of a texel; a world that is finer than the map gets as many as it is finer.
 SAMPLES = 4
+# And of a map that is made in a moment.
+ROUGH_SAMPLES = 2
 # A texel that carries more than this share of all the light is a sun or a lamp: its edge is
 # rendered again, this many times as fine as the world (which leaves 0.3% of the light of a lamp of
 # two of the world's texels), or as its part of these samples allows.
@@ -136,20 +140,9 @@ def _coarser(environment: Environment, scale: int) -> Environment:
     return Environment((rows / scale).astype(np.float32))
 
 
-def bake(
-    scene: bpy.types.Scene,
-    width: int,
-    view_layer: str | None = None,
-    world: bpy.types.World | None = None,
-) -> Environment:
-    """The light of a view layer's world as an equirectangular map, width x width/2, in the working
-    space. world: another than the layer's.
-
-    Every texel is the mean over itself, of as many samples as the world's own detail asks for: a
-    disc of a tenth of a degree keeps its light to 1%. Raises SceneError for a world that is not
-    there or lacks an image.
-    """
-    world = world or check_world(scene, view_layer)
+@contextmanager
+def _panorama(scene: bpy.types.Scene, world: bpy.types.World) -> Iterator[Any]:
+    """A studio with a camera that sees all of a world, as the scene's surfaces see it."""
     with studio_scene(scene, world, "ARTO World") as (studio, made):
         lens = bpy.data.cameras.new("ARTO Panorama")
         camera = bpy.data.objects.new("ARTO Panorama", lens)
@@ -166,6 +159,34 @@ def bake(
             rays = studio.world.cycles_visibility
             # what is hidden from some rays lights by others; these are those of the box
             rays.transmission = rays.diffuse or rays.glossy or rays.transmission or rays.scatter
+        studio.cycles.pixel_filter_type = "BOX"
+        yield studio
+
+
+def rough(scene: bpy.types.Scene, width: int, world: bpy.types.World) -> Environment:
+    """A map of a world that is made in a moment, for while a hand is on it: each texel of a few
+    samples, so that what is finer is noisy."""
+    with _panorama(scene, world) as studio:
+        studio.render.resolution_x, studio.render.resolution_y = width, width // 2
+        studio.cycles.samples = ROUGH_SAMPLES
+        return Environment(np.ascontiguousarray(render_studio(studio)[..., :3]))
+
+
+def bake(
+    scene: bpy.types.Scene,
+    width: int,
+    view_layer: str | None = None,
+    world: bpy.types.World | None = None,
+) -> Environment:
+    """The light of a view layer's world as an equirectangular map, width x width/2, in the working
+    space. world: another than the layer's.
+
+    Every texel is the mean over itself, of as many samples as the world's own detail asks for: a
+    disc of a tenth of a degree keeps its light to 1%. Raises SceneError for a world that is not
+    there or lacks an image.
+    """
+    world = world or check_world(scene, view_layer)
+    with _panorama(scene, world) as studio:
         finest = detail(world)
         # a lamp is looked for in small texels, and a coarse map gets their means
         scale = math.ceil(min(finest, LEAST_WIDTH) / width)
@@ -174,7 +195,6 @@ def bake(
         render.resolution_x, render.resolution_y = width, height
         # the world's images are read once for all blocks
         render.use_persistent_data = True
-        studio.cycles.pixel_filter_type = "BOX"
         fineness = finest / width
         studio.cycles.samples = _power_of_two(fineness**2)
         image = np.ascontiguousarray(render_studio(studio)[..., :3])

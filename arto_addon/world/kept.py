@@ -9,10 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import math
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +24,7 @@ from ..shot import paths
 from ..shot.fingerprint import of_blocks
 from .bake import bake
 from .check import check_world
-from .detail import values_only
+from .dials import read, without_dials
 
 # A map counts for this version of how maps are made.
 VERSION = 1
@@ -49,7 +46,7 @@ def environment(
     world: another than the layer's. Raises what `bake` raises.
     """
     world = world or check_world(scene, view_layer)
-    with _without_dials(world) as (plain, strength, turn):
+    with without_dials(world) as (plain, strength, turn):
         path = paths.worlds_folder(scene) / f"{_key(scene, plain, width)}.npy"
         if _last.get("key") == (path, strength):
             return Environment(_last["image"], turn)
@@ -73,7 +70,7 @@ def painted(
     mask: an image that lies on the HDRI as that lies on the sky. Raises SceneError where the world
     has not one HDRI alone.
     """
-    with _without_dials(world) as (plain, _, _):
+    with without_dials(world) as (plain, _, _):
         found = [n for t in trees(plain.node_tree, set()) for n in t.nodes]
         textures = [n for n in found if n.bl_idname == "ShaderNodeTexEnvironment" and n.image]
         if len(textures) != 1 or textures[0].id_data != plain.node_tree:
@@ -116,74 +113,29 @@ def _key(scene: bpy.types.Scene, world: bpy.types.World, width: int) -> str:
     # a copy of the world has another name
     found = of_blocks([world])
     of.append(sorted(("World" if k.startswith("World") else k, v) for k, v in found.items()))
-    moving = any(
+    if moving_images(world):
+        of.append((scene.frame_current, scene.frame_subframe))
+    return hashlib.sha256(repr(of).encode()).hexdigest()[:16]
+
+
+def moving_images(world: bpy.types.World) -> bool:
+    """Whether a world shows a sequence or a movie."""
+    return any(
         node.bl_idname == "ShaderNodeTexEnvironment"
         and node.image
         and node.image.source in {"SEQUENCE", "MOVIE"}
         for tree in trees(world.node_tree, set())
         for node in tree.nodes
     )
-    if moving:
+
+
+def shows(scene: bpy.types.Scene, world: bpy.types.World) -> tuple[str, float, float]:
+    """What a world shows, told apart from its strength and turn -> (key, strength, turn).
+
+    Quick, and nothing is changed or copied: for who looks many times a second.
+    """
+    strength, turn, dials = read(world)
+    of: list[Any] = sorted(of_blocks([world], without=dials).items())
+    if moving_images(world):
         of.append((scene.frame_current, scene.frame_subframe))
-    return hashlib.sha256(repr(of).encode()).hexdigest()[:16]
-
-
-@contextmanager
-def _without_dials(world: bpy.types.World) -> Iterator[tuple[Any, float, float]]:
-    """A copy of the world as it is now without its strength and turn, and those two."""
-    plain = world.copy()
-    try:
-        for block in (plain, plain.node_tree):
-            if block:
-                block.animation_data_clear()
-        background, mapping = _dials(plain)
-        strength, turn = 1.0, 0.0
-        if background:
-            strength = background.inputs["Strength"].default_value
-            background.inputs["Strength"].default_value = 1.0
-        if mapping:
-            turn = mapping.inputs["Rotation"].default_value[2] % (2 * math.pi)
-            mapping.inputs["Rotation"].default_value[2] = 0.0
-        yield plain, strength, turn
-    finally:
-        bpy.data.worlds.remove(plain)
-
-
-def _dials(world: bpy.types.World) -> tuple[Any, Any]:
-    """The background node whose strength is that of all the world, and the mapping node that turns
-    it; None where there is no such one."""
-    out = world.node_tree.get_output_node("CYCLES") if world.node_tree else None
-    links = out.inputs["Surface"].links if out else ()
-    if not links or links[0].is_muted:
-        return None, None
-    background = links[0].from_node
-    if background.bl_idname != "ShaderNodeBackground" or background.mute:
-        return None, None
-    dial = None if background.inputs["Strength"].is_linked else background
-    nodes = [n for n in world.node_tree.nodes if not n.mute]
-    textures = [n for n in nodes if n.bl_idname == "ShaderNodeTexEnvironment"]
-    mappings = [n for n in nodes if n.bl_idname == "ShaderNodeMapping"]
-    if len(textures) != 1 or len(mappings) != 1 or len(nodes) != len(world.node_tree.nodes):
-        return dial, None
-    texture, mapping = textures[0], mappings[0]
-    into, source = texture.inputs["Vector"].links, mapping.inputs["Vector"].links
-    straight = (
-        into
-        and into[0].from_node == mapping
-        and source
-        and source[0].from_node.bl_idname == "ShaderNodeTexCoord"
-        and source[0].from_socket.name == "Generated"
-        and len(mapping.outputs[0].links) == 1
-    )
-    # nothing else may know of a direction
-    if not straight or not values_only(background, {texture}):
-        return dial, None
-    if mapping.vector_type != "POINT" or any(
-        mapping.inputs[n].is_linked for n in ("Location", "Rotation", "Scale")
-    ):
-        return dial, None
-    scale, place = mapping.inputs["Scale"].default_value, mapping.inputs["Location"].default_value
-    rotation = mapping.inputs["Rotation"].default_value
-    # what is not scaled alike along x and y is another world when it is turned
-    turns = scale[0] == scale[1] and not any(place) and not any(rotation[:2])
-    return dial, mapping if turns else None
+    return repr(of), strength, turn

@@ -1,0 +1,322 @@
+"""Live: while the switch is on, the shot follows its world.
+
+A timer looks what the world is (at most thirty times a second, and it does nothing that takes
+longer than a moment); maps of it are made by another Blender (`maps`), pictures by a thread
+(`viewer`). While the hand moves they are small, when it rests they are whole, and when it rests
+longer a relight is started, with the world's lamps and denoised.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+from numpy.typing import NDArray
+
+from ...core.errors import ArtoError, SceneError
+from ...core.preview import Preview
+from ..job import session
+from ..relight.own import gains_of
+from ..relight.plate import name_of
+from ..relight.relight import Shown
+from ..shot import watch
+from ..shot.shot import check_same_shot, layer_of
+from ..world.check import check_world, world_of
+from ..world.kept import shows
+from . import maps
+from .viewer import Viewer, Wish
+
+IMAGE = "ARTO Live"
+EVERY = 1 / 30
+# Looked at without being told of a change: a world may be of another file.
+ANYWAY = 0.5
+# Seconds of rest until a picture is made whole, and until it is finished by a relight.
+WHOLE, FINISHED = 0.25, 2.0
+
+
+class Live:
+    """A shot that follows its world."""
+
+    def __init__(self, scene: bpy.types.Scene) -> None:
+        """Raises what opening the shot's field raises, SceneError for a world that is none."""
+        self.scene_uid = scene.session_uid
+        self.layer = layer_of(scene)
+        self.name = name_of(scene)
+        check_world(scene, self.layer)
+        shown = Shown(scene, self.layer)
+        check_same_shot(scene, shown.field.about.get("shot"), "the reflectance field", self.layer)
+        self.folder = shown.field.folder
+        self.written = (self.folder / "field.json").stat().st_mtime_ns
+        self.viewer = Viewer(Preview([take.field for take in shown.takes]))
+        self.maps = maps.Maps()
+        self.shape = shown.field.shape
+        self.trouble = ""
+        self.line = "starting"
+        self.dirty = True
+        self._looked = 0.0
+        self._now: tuple[Any, ...] = ()
+        self._changed = 0.0
+        self._wished: tuple[Any, ...] = ()
+        self._asked_with = 1.0, 0.0
+        self._finished: tuple[Any, ...] = ()
+        self.relighting = False
+        self.maps.start()
+
+    @property
+    def scene(self) -> bpy.types.Scene | None:
+        return next((s for s in bpy.data.scenes if s.session_uid == self.scene_uid), None)
+
+    def tick(self) -> bool:
+        """Look, wish, show; whether it goes on."""
+        scene = self.scene
+        if scene is None:
+            return False
+        if not self._same_field():
+            raise SceneError("the shot was captured anew: switch Live on again")
+        now = time.monotonic()
+        if self.dirty or now - self._looked > ANYWAY:
+            self.dirty, self._looked = False, now
+            self._look(scene, now)
+        self._wish(scene, now)
+        shown = self.viewer.take()
+        if shown is not None:
+            picture = np.repeat(np.repeat(shown.picture, shown.factor, 0), shown.factor, 1)
+            push(picture[: self.shape[0], : self.shape[1]], self.name)
+            size = "whole" if shown.factor == 1 else f"1/{shown.factor} of the size"
+            self.line = f"{size}, after {shown.latency:.2f} s"
+            redraw_pictures()
+        self.trouble = self.maps.trouble or self.viewer.trouble
+        return True
+
+    def _same_field(self) -> bool:
+        try:
+            return (self.folder / "field.json").stat().st_mtime_ns == self.written
+        except OSError:
+            return False
+
+    def _look(self, scene: bpy.types.Scene, now: float) -> None:
+        """What is to be shown now."""
+        world = world_of(scene, self.layer)
+        if world is None:
+            raise SceneError("the scene has no world any more: add one, and switch Live on again")
+        key, strength, turn = shows(scene, world)
+        settings = scene.arto
+        found = (key, strength, turn, settings.own_lamps, tuple(gains_of(settings).items()))
+        if found != self._now:
+            self._now, self._changed = found, now
+            if self.relighting and session.current and session.current.verb == "relight":
+                session.cancel()  # of what is not wanted any more
+            self.relighting = False
+
+    def _wish(self, scene: bpy.types.Scene, now: float) -> None:
+        key, strength, turn, own, _ = self._now
+        rest = now - self._changed
+        world = world_of(scene, self.layer)
+        full = self.maps.get(key, True)
+        image = full if full is not None else self.maps.get(key, False)
+        if world and not self.maps.busy:
+            if image is None and self.maps.ask(scene, self.layer, world, key, False):
+                self._asked_with = strength, turn
+            elif image is not None and full is None and rest > WHOLE:
+                self.maps.ask(scene, self.layer, world, key, True)
+        if image is None:
+            # the hand is quicker than maps are made: the last one is nearer than none
+            newest = self.maps.newest
+            if newest is None or self._wished[:1] == (newest[0],):
+                return
+            image = newest[1]
+            strength, turn = self._asked_with
+            wished: tuple[Any, ...] = (newest[0],)
+            resting = False
+        else:
+            resting = rest > WHOLE and full is not None
+            wished = (*self._now, id(image), resting)
+        if wished != self._wished:
+            self._wished = wished
+            gains = gains_of(scene.arto)
+            view = None if scene.render.film_transparent else view_of(scene, self.shape)
+            self.viewer.wish(Wish(image, strength, turn, own, gains, resting, view))
+        if resting and rest > FINISHED and scene.arto.live_finish:
+            self._finish(scene)
+
+    def _finish(self, scene: bpy.types.Scene) -> None:
+        """Start the relight that finishes what is shown, once."""
+        if self._finished == self._now or session.current or bpy.app.is_job_running("RENDER"):
+            return
+        if not self.viewer.idle:
+            return
+        self._finished, self.relighting = self._now, True
+        session.start("relight", scene, self.layer)
+
+    def close(self) -> None:
+        self.viewer.close()
+        self.maps.close()
+
+
+def view_of(scene: bpy.types.Scene, shape: tuple[int, int]) -> NDArray[np.float32] | None:
+    """The direction that each pixel of the scene's camera sees, (H, W, 3); None for a panorama,
+    whose pixels are not on a plane."""
+    camera = scene.camera
+    if camera is None or camera.type != "CAMERA" or camera.data.type == "PANO":
+        return None
+    corners = np.array([tuple(c) for c in camera.data.view_frame(scene=scene)], np.float32)
+    # right top, right bottom, left bottom, left top
+    right, down = corners[0] - corners[3], corners[1] - corners[0]
+    height, width = shape
+    x = (np.arange(width, dtype=np.float32) + 0.5) / width
+    y = (np.arange(height, dtype=np.float32) + 0.5) / height
+    turned = np.array(camera.matrix_world.to_3x3().normalized(), np.float32)
+    if camera.data.type == "ORTHO":
+        look = turned @ np.array([0, 0, -1], np.float32)
+        return np.broadcast_to(look, (height, width, 3))
+    local = corners[3] + x[None, :, None] * right + y[:, None, None] * down
+    return local @ turned.T
+
+
+def push(picture: NDArray[np.float32], name: str) -> bpy.types.Image:
+    """Put a picture (H, W, 4), rows top-down, into the live image, shown as the plate is."""
+    height, width = picture.shape[:2]
+    image = bpy.data.images.get(IMAGE)
+    if image is not None and (image.source != "GENERATED" or image.library):
+        bpy.data.images.remove(image)
+        image = None
+    if image is None:
+        image = bpy.data.images.new(IMAGE, width, height, alpha=True, float_buffer=True)
+        image.colorspace_settings.name = bpy.data.colorspace.working_space
+        image.alpha_mode = "PREMUL"
+        image.use_view_as_render = True
+        image.use_fake_user = False
+    elif tuple(image.size) != (width, height):
+        image.scale(width, height)
+    image.pixels.foreach_set(np.ascontiguousarray(picture[::-1], np.float32).ravel())
+    image.update()
+    # where the plate is looked at, its light is now seen live
+    for space in spaces():
+        shown = space.image
+        if shown is not None and shown != image and shown.name == name:
+            space.image = image
+    return image
+
+
+def spaces() -> list[bpy.types.SpaceImageEditor]:
+    """The image editors that are open."""
+    manager = bpy.context.window_manager
+    areas = [a for w in manager.windows for a in w.screen.areas] if manager else []
+    return [a.spaces.active for a in areas if a.type == "IMAGE_EDITOR"]
+
+
+def redraw_pictures() -> None:
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type in {"IMAGE_EDITOR", "PROPERTIES", "VIEW_3D"}:
+                area.tag_redraw()
+
+
+current: Live | None = None
+# Why it is off, where it went off by itself.
+trouble = ""
+
+
+def start(scene: bpy.types.Scene) -> None:
+    """Switch it on. Raises what `Live` raises."""
+    global current, trouble
+    stop()
+    trouble = ""
+    current = Live(scene)
+    if not bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.register(_tick, first_interval=0.0)
+
+
+def stop() -> None:
+    """Switch it off; editors that showed it show the plate again."""
+    global current
+    if current is None:
+        return
+    ended, current = current, None
+    ended.close()
+    put_away(ended.name)
+
+
+def put_away(name: str) -> None:
+    """Remove the live image: it is of no file."""
+    image = bpy.data.images.get(IMAGE)
+    if image is None:
+        return
+    for space in spaces():
+        if space.image == image:
+            space.image = bpy.data.images.get(name)
+    bpy.data.images.remove(image)
+
+
+def _tick() -> float | None:
+    global trouble
+    if current is None:
+        return None
+    try:
+        if current.tick():
+            return EVERY
+    except ArtoError as e:
+        trouble = str(e)
+    except Exception as e:
+        trouble = f"{type(e).__name__}: {e}"
+        stop()
+        raise
+    stop()
+    watch.redraw()
+    return None
+
+
+@persistent
+def _changed(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if current is not None:
+        kinds = (bpy.types.World, bpy.types.NodeTree, bpy.types.Image, bpy.types.Scene)
+        if any(isinstance(u.id, kinds) for u in depsgraph.updates):
+            current.dirty = True
+
+
+@persistent
+def _stop(*_: object) -> None:
+    stop()
+
+
+@persistent
+def _before_save(*_: object) -> None:
+    if current is not None:
+        put_away(current.name)
+        current._wished = ()
+
+
+_HANDLERS = {
+    "depsgraph_update_post": _changed,
+    "load_pre": _stop,
+    "save_pre": _before_save,
+    "exit_pre": _stop,
+}
+
+
+def register() -> None:
+    if not bpy.app.background:
+        for name, handler in _HANDLERS.items():
+            getattr(bpy.app.handlers, name).append(handler)
+
+
+def unregister() -> None:
+    stop()
+    for name, handler in _HANDLERS.items():
+        handlers = getattr(bpy.app.handlers, name)
+        if handler in handlers:
+            handlers.remove(handler)
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
+
+
+def wrote(path: Path) -> bool:
+    """A relight has ended -> whether what it shows is what Live wants to be shown still."""
+    if current is None or not current.relighting:
+        return True
+    current.relighting = False
+    return bool(path) and current._finished == current._now

@@ -1,0 +1,104 @@
+"""The plate beside the last render: side by side, or with a wipe between them."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core import exr
+from ...core.errors import SceneError
+from ..shot import paths
+
+IMAGE = "ARTO Compare"
+# The two pictures, read once.
+_pictures: dict[int, tuple[NDArray[np.float32], NDArray[np.float32]]] = {}
+
+
+def begin(scene: bpy.types.Scene) -> bpy.types.Image:
+    """Read plate and render, and compare them -> the image that shows it. Raises SceneError."""
+    path = paths.relit_file(scene)
+    if not path.is_file():
+        raise SceneError("there is no plate to compare: press Relight first")
+    plate = next(iter(exr.read(path).values()))
+    render = _last_render(scene)
+    if render.shape[:2] != plate.shape[:2]:
+        raise SceneError(
+            f"the last render is {render.shape[1]} x {render.shape[0]}, the plate "
+            f"{plate.shape[1]} x {plate.shape[0]}: render the shot at the plate's size"
+        )
+    _pictures[scene.session_uid] = plate, render
+    if scene.arto.compare == "OFF":
+        scene.arto.compare = "SIDE"
+    return update(scene) or bpy.data.images[IMAGE]
+
+
+def _last_render(scene: bpy.types.Scene) -> NDArray[np.float32]:
+    """What Blender rendered last, (H, W, 4). Raises SceneError where it has rendered nothing."""
+    result = bpy.data.images.get("Render Result")
+    settings = bpy.data.scenes.new("ARTO Output")
+    try:
+        from ..blender.output import float_exr
+
+        float_exr(settings.render, multilayer=False)
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "render.exr"
+            if result is None:
+                raise SceneError("nothing was rendered yet: press F12 once, then Compare")
+            try:
+                result.save_render(str(path), scene=settings)
+            except RuntimeError as e:
+                raise SceneError("nothing was rendered yet: press F12 once, then Compare") from e
+            return next(iter(exr.read(path).values()))
+    finally:
+        bpy.data.scenes.remove(settings)
+
+
+def update(scene: bpy.types.Scene) -> bpy.types.Image | None:
+    """Show the comparison as its settings are now; None where none was begun."""
+    found = _pictures.get(scene.session_uid)
+    if found is None:
+        return None
+    plate, render = found
+    out = joined(plate, render, scene.arto.compare, scene.arto.wipe)
+    image = bpy.data.images.get(IMAGE)
+    height, width = out.shape[:2]
+    if image is None:
+        image = bpy.data.images.new(IMAGE, width, height, alpha=True, float_buffer=True)
+        image.colorspace_settings.name = bpy.data.colorspace.working_space
+        image.alpha_mode = "PREMUL"
+        image.use_view_as_render = True
+    elif tuple(image.size) != (width, height):
+        image.scale(width, height)
+    image.pixels.foreach_set(np.ascontiguousarray(out[::-1]).ravel())
+    image.update()
+    return image
+
+
+def joined(plate: NDArray, render: NDArray, how: str, wipe: float) -> NDArray[np.float32]:
+    """The two pictures (H, W, 4) in one."""
+    width = plate.shape[1]
+    if how == "SIDE":
+        # the middle of each, at their size
+        half = width // 2
+        left = (width - half) // 2
+        return np.concatenate(
+            [plate[:, left : left + half], render[:, left : left + width - half]], axis=1
+        ).astype(np.float32)
+    share = {"OFF": 1.0, "RENDER": 0.0}.get(how, wipe)
+    border = round(share * width)
+    out = np.concatenate([plate[:, :border], render[:, border:]], axis=1).astype(np.float32)
+    if 0 < border < width:
+        out[:, border] = (1, 1, 1, 1)
+    return out
+
+
+def forget() -> None:
+    """Let go of the pictures, and of the image that shows them."""
+    _pictures.clear()
+    image = bpy.data.images.get(IMAGE)
+    if image is not None:
+        bpy.data.images.remove(image)

@@ -1,0 +1,82 @@
+"""The scene's composite, without a render: where it is made of plates, footage and other files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import SceneError
+from ..blender.compositing import OUTPUT, composited, compositor, own_compositor
+from ..shot import paths
+
+COMPOSITE = "ARTO Composite"
+
+
+def composite_file(scene: bpy.types.Scene) -> Path:
+    """Beside the plate, with the ending of the scene's output format. Raises SceneError."""
+    plate = paths.relit_file(scene)
+    return plate.with_name(f"{plate.stem}_composite{scene.render.file_extension}")
+
+
+def save_composite(scene: bpy.types.Scene) -> Path:
+    """Write what the scene's compositor puts out -> the file.
+
+    Raises SceneError where it has none, or shows a render: only files are at hand here.
+    """
+    tree = compositor(scene)
+    if tree is None:
+        raise SceneError("the scene has no compositor: press Relight first, which makes one")
+    if needed := _renders(tree):
+        raise SceneError(
+            f"the composite shows the render ('{needed}'), and nothing is rendered here: set Use "
+            "in Compositor to Instead of the Render, or press F12"
+        )
+    path = composite_file(scene)
+    picture = _composited(scene)
+    height, width = picture.shape[:2]
+    image = bpy.data.images.new(COMPOSITE, width, height, alpha=True, float_buffer=True)
+    try:
+        image.colorspace_settings.name = bpy.data.colorspace.working_space
+        image.alpha_mode = "PREMUL"
+        image.pixels.foreach_set(np.ascontiguousarray(picture[::-1]).ravel())
+        image.save_render(str(path), scene=scene)
+    except RuntimeError as e:
+        raise SceneError(f"{path} cannot be written ({e})") from e
+    finally:
+        bpy.data.images.remove(image)
+    return path
+
+
+def _composited(scene: bpy.types.Scene) -> NDArray[np.float32]:
+    """What the compositor puts out, (H, W, 4), in a copy of the scene in which nothing asks for a
+    render or writes a file."""
+    copy = scene.copy()
+    made: list[Any] = [copy]
+    try:
+        copy.frame_set(scene.frame_current, subframe=scene.frame_subframe)
+        tree = own_compositor(copy, made)
+        for node in list(tree.nodes):
+            if node.bl_idname in {"CompositorNodeRLayers", "CompositorNodeOutputFile"}:
+                tree.nodes.remove(node)
+        return composited(copy, "the composite")
+    finally:
+        bpy.data.batch_remove(made)
+
+
+def _renders(tree: Any) -> str:
+    """The name of a node that shows a render and that the output hangs on; empty for none."""
+    found: list[Any] = [n for n in tree.nodes if n.bl_idname == OUTPUT]
+    seen = set()
+    while found:
+        node = found.pop()
+        if node.name in seen or node.mute:
+            continue
+        seen.add(node.name)
+        if node.bl_idname == "CompositorNodeRLayers":
+            return node.name
+        found += [link.from_node for socket in node.inputs for link in socket.links]
+    return ""

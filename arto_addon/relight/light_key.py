@@ -1,0 +1,25 @@
+"""What a plate hangs on besides the field: by it the window knows whether one is up to date."""
+
+from __future__ import annotations
+
+import hashlib
+
+import bpy
+
+from ..world.kept import shows
+from .own import gains_of
+
+# In a plate's header.
+HEADER = "arto.light key"
+# Settings that change the picture.
+_SETTINGS = ("own_lamps", "lamps", "lamp_samples", "denoise", "environment_width", "layers")
+
+
+def light_key(scene: bpy.types.Scene, world: bpy.types.World) -> str:
+    """Sixteen letters that are the same for the same light of a scene."""
+    key, strength, turn = shows(scene, world)
+    settings = scene.arto
+    of: list[object] = [key, round(strength, 5), round(turn, 5), scene.render.film_transparent]
+    of += [str(getattr(settings, n)) for n in _SETTINGS]
+    of += [sorted((n, round(g, 5)) for n, g in gains_of(settings).items())]
+    return hashlib.sha256(repr(of).encode()).hexdigest()[:16]

@@ -1,0 +1,98 @@
+"""Looks: lights that a shot is shown in, each with a world of its own, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import bpy
+
+from ...core.errors import SceneError
+from ...core.relight import together
+from ..shot import paths
+from ..shot.shot import check_same_shot, layer_of
+from ..work import Progress, Steps
+from ..world.check import world_of
+from .relight import Light, Ready, Shown, finish, make_ready
+
+
+def add(scene: bpy.types.Scene, name: str = "") -> Any:
+    """A look of the light as it is now; it is shown. The first one takes the world as it stands,
+    the others a copy, so that each has its own. Raises SceneError without a world."""
+    settings = scene.arto
+    world = world_of(scene)
+    if world is None:
+        raise SceneError("the scene has no world to make a look of: add one with an HDRI")
+    taken = {look.world for look in settings.looks}
+    look = settings.looks.add()
+    look.name = free_name(scene, name or "Look")
+    if world in taken:
+        world = world.copy()
+    look.world = world
+    settings.active_look = len(settings.looks) - 1  # which shows it
+    return look
+
+
+def remove(scene: bpy.types.Scene) -> str:
+    """Remove the look that is shown -> its name; its world stays in the file while it is used."""
+    settings = scene.arto
+    name = settings.looks[settings.active_look].name
+    settings.looks.remove(settings.active_look)
+    if settings.looks:
+        settings.active_look = max(0, settings.active_look - 1)
+    else:
+        settings.look = ""
+    return name
+
+
+def show(scene: bpy.types.Scene) -> None:
+    """Show the scene in the look that is chosen: its world, and its plate's name."""
+    settings = scene.arto
+    if not 0 <= settings.active_look < len(settings.looks):
+        return
+    look = settings.looks[settings.active_look]
+    settings.look = look.name
+    layer = scene.view_layers.get(layer_of(scene))
+    if look.world is None:
+        return
+    if layer is not None and layer.world_override is not None:
+        layer.world_override = look.world
+    else:
+        scene.world = look.world
+
+
+def free_name(scene: bpy.types.Scene, name: str) -> str:
+    """That name, or with a number after it where a look has it."""
+    taken, number, found = {look.name for look in scene.arto.looks}, 2, name
+    while found in taken:
+        found, number = f"{name} {number}", number + 1
+    return found
+
+
+def relight_looks(scene: bpy.types.Scene, view_layer: str) -> Steps:
+    """Relight the shot in each of its looks; returns the paths of the plates.
+
+    Raises what `relight.compute` raises, SceneError where there are no looks.
+    """
+    looks: Sequence[Any] = [look for look in scene.arto.looks if look.world]
+    if not looks:
+        raise SceneError("there are no looks to relight: add one")
+    scene.view_layers[view_layer].update()
+    shown = Shown(scene, view_layer)
+    check_same_shot(scene, shown.field.about.get("shot"), "the reflectance field", view_layer)
+    most = max(1, together(shown.field) // len(shown.takes))
+    done = []
+    for first in range(0, len(looks), most):
+        ready: list[Ready] = []
+        for look in looks[first : first + most]:
+            share = (len(done) + len(ready)) / len(looks)
+            path = paths.relit_file(scene, look.name)
+            yield Progress(share, f"look {len(done) + len(ready) + 1} of {len(looks)}: {look.name}")
+            ready.append((yield from make_ready(shown, Light(path, look.name, look.world))))
+        pictures = shown.pictures([r.light for r in ready])
+        for one, picture in zip(ready, pictures, strict=True):
+            one.laps.go_on()
+            yield from finish(shown, one, picture)
+            done.append(one.lit.path)
+    yield Progress(1.0, f"wrote {len(done)} looks, the last one {done[-1].name}")
+    return done

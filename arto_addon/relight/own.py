@@ -1,0 +1,33 @@
+"""The scene's own lamps in a relit picture: how much of each light group is shown."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.field import Field
+from ...core.preview import own_light
+
+
+def gains_of(settings: Any) -> dict[str, float]:
+    """How much of each light group of the scene's own lamps is shown."""
+    return {group.name: group.gain if group.show else 0.0 for group in settings.own_groups}
+
+
+def own_of(scene: bpy.types.Scene, field: Field) -> NDArray[np.float32]:
+    """The light of the scene's own lamps in a field, as the settings have it -> (H, W, 3)."""
+    return own_light(field, scene.arto.own_lamps, gains_of(scene.arto))
+
+
+def sync(scene: bpy.types.Scene, field: Field) -> None:
+    """Have an entry in the settings for each light group that a field knows; others go."""
+    there = {name.removeprefix("own_") for name in field.own_layers}
+    groups = scene.arto.own_groups
+    for i in reversed(range(len(groups))):
+        if groups[i].name not in there:
+            groups.remove(i)
+    for name in sorted(there - {group.name for group in groups}):
+        groups.add().name = name

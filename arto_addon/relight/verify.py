@@ -1,0 +1,77 @@
+"""Verify: a few samples of the truth, rendered as Blender would, beside the plate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core import exr
+from ...core.errors import SceneError
+from ...core.verify import Verdict, marked, verify
+from ..shot import paths
+from ..shot.shot import layer_of
+from ..stage.small import parts_of
+from ..stage.stage import stage
+from ..work import Progress, Steps
+from . import plate
+from .own import gains_of
+
+# Samples of each of the two renders.
+SAMPLES = 16
+
+
+def verify_file(path: Path) -> Path:
+    """Beside a plate: where it differs from a render by more than noise."""
+    return path.with_name(f"{path.stem}_verify.exr")
+
+
+def verify_plate(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
+    """Render two times a few samples of the scene, and hold its plate against them.
+
+    Returns the path of the picture that shows where it is off; what was found is in its header.
+    Raises SceneError where there is no plate or it is of another size, CancelledError.
+    """
+    layer = view_layer or layer_of(scene)
+    path = paths.relit_file(scene)
+    if not path.is_file():
+        raise SceneError(f"there is no plate {path} to verify: press Relight first")
+    there = next(iter(exr.read(path).values()))
+    renders: list[NDArray[np.float32]] = []
+    for seed in (1, 2):
+        with stage(scene, layer) as on:
+            on.change("render.engine", "CYCLES")
+            on.change("cycles.samples", SAMPLES)
+            on.change("cycles.seed", scene.cycles.seed + 7919 * seed)
+            on.change("cycles.use_animated_seed", False)
+            on.change("cycles.use_layer_samples", "IGNORE")
+            on.change("cycles.use_adaptive_sampling", False)
+            on.change("cycles.use_denoising", False)
+            on.change("cycles.time_limit", 0.0)
+            # the plate has all its light; a render that leaves some out would be off by that
+            on.change("cycles.sample_clamp_direct", 0.0)
+            on.change("cycles.sample_clamp_indirect", 0.0)
+            on.change("render.use_crop_to_border", False)
+            text = f"rendering {SAMPLES} samples to compare with, {seed} of 2"
+            parts = yield from parts_of(on, text, (seed - 1) / 2, 0.5)
+            renders.append(next(p for n, p in parts.items() if n.endswith("Combined")))
+    if renders[0].shape[:2] != there.shape[:2]:
+        raise SceneError("the plate has another size than a render now: press Relight first")
+    yield Progress(0.95, "comparing")
+    found = verify(there[..., :3], renders[0][..., :3], renders[1][..., :3])
+    told = {"verify": said(scene, found), "samples": f"2 x {SAMPLES}"}
+    out = verify_file(path)
+    plate.write(scene, out, marked(there, found), told)
+    yield Progress(1.0, told["verify"])
+    return out
+
+
+def said(scene: bpy.types.Scene, found: Verdict) -> str:
+    """What was found, in a sentence or two."""
+    text = f"{found.line}; mean difference {found.error:.1%}, noise {found.noise:.1%}"
+    settings = scene.arto
+    if settings.own_lamps != 1 or any(gain != 1 for gain in gains_of(settings).values()):
+        text += ". The plate has the scene's lamps at other gains than a render"
+    return text

@@ -1,0 +1,32 @@
+"""The one button: capture a shot, fit what was captured, and show it in its light."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+from .capture.capture import capture
+from .fit import fit
+from .relight.relight import compute
+from .shot.shot import layer_of
+from .work import Progress, Steps, part_of
+from .world.check import world_of
+
+# Of the whole work, what the capture is, and what fitting is where it was not done meanwhile.
+CAPTURED, FITTED = 0.9, 0.95
+
+
+def shoot(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
+    """Capture, fit and relight; returns (the path of the plate, None where there is no world).
+
+    Raises what the three raise: what is done by then stays. Nothing of the scene changes.
+    """
+    layer = view_layer or layer_of(scene)
+    yield from part_of(capture(scene, layer), 0.0, CAPTURED)
+    yield from part_of(fit(scene, layer), CAPTURED, FITTED - CAPTURED)
+    if world_of(scene, layer) is None:
+        yield Progress(1.0, "captured: add a world with an HDRI to see the shot in its light")
+        return (None,)
+    path, _ = yield from part_of(compute(scene, layer), FITTED, 1 - FITTED)
+    return (Path(path),)

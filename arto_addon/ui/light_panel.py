@@ -1,0 +1,133 @@
+"""The panel *Light*: the world, live, lamps, and looks."""
+
+from __future__ import annotations
+
+import contextlib
+
+import bpy
+
+from ...core import exr
+from ...core.errors import ArtoError
+from ..live import live
+from ..shot import paths, status
+from ..world import controls
+from ..world.check import world_of
+from . import thumbnails
+from .places import Draws, say
+
+
+class Light(Draws):
+    """The world's light, and the scene's own lamps"""
+
+    label = "Light"
+
+    @staticmethod
+    def draw_column(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
+        scene = context.scene
+        world = world_of(scene)
+        if world is None:
+            say(column, context, "The scene has no world", "ERROR")
+            column.operator("arto.open_hdri", icon="FILE_FOLDER")
+            return
+        _world(column, context, world)
+        _live(column, context)
+        _own(column, context)
+        _looks(column, context)
+
+
+def _world(column: bpy.types.UILayout, context: bpy.types.Context, world: bpy.types.World) -> None:
+    image = controls.hdri(world)
+    if image is not None:
+        row = column.row()
+        row.alignment = "CENTER"
+        row.template_icon(thumbnails.of_hdri(image), scale=4.5)
+    nodes = controls.texture_nodes(world)
+    if nodes:
+        column.template_ID(nodes[0], "image", open="image.open")
+    else:
+        column.operator("arto.open_hdri", icon="FILE_FOLDER")
+    dials = column.column(align=True)
+    turned = dials.row()
+    why = controls.why_not_turned(world)
+    turned.enabled = not why
+    turned.prop(world.arto, "rotation", slider=True)
+    rest = dials.column(align=True)
+    rest.enabled = not world.library and bool(controls.backgrounds(world))
+    rest.prop(world.arto, "strength")
+    rest.prop(world.arto, "tint")
+    if why:
+        say(column, context, why, "INFO")
+
+
+def _live(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    scene = context.scene
+    there = status.field_line(scene) is not None
+    row = column.row(align=True)
+    row.scale_y = 1.3
+    row.enabled = there or live.current is not None
+    switch = context.window_manager.arto
+    row.prop(switch, "live", toggle=True, icon="LIGHT_SUN")
+    row.prop(scene.arto, "live_finish", text="", icon="CHECKMARK")
+    if not row.enabled:
+        say(column, context, "Capture the shot to see it live", "INFO")
+    if live.current is not None:
+        say(column, context, live.current.trouble or f"Live: {live.current.line}")
+    elif live.trouble:
+        say(column, context, live.trouble[0].upper() + live.trouble[1:], "ERROR")
+    column.prop(scene.arto, "lamps")
+    if scene.arto.lamps and (text := lamps_line(scene)):
+        say(column, context, text)
+
+
+def lamps_line(scene: bpy.types.Scene) -> str:
+    """What the last plate says of the HDRI's suns."""
+    try:
+        header = exr.header(paths.relit_file(scene))
+    except (ArtoError, OSError):
+        return ""
+    found = str(header.get("arto.lamps", ""))
+    return f"Suns: {found}" if found and found != "no" else ""
+
+
+def _own(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    settings = context.scene.arto
+    column.separator(factor=0.5)
+    column.prop(settings, "own_lamps")
+    for group in settings.own_groups:
+        row = column.row(align=True)
+        icon = "HIDE_OFF" if group.show else "HIDE_ON"
+        row.prop(group, "show", text="", icon=icon, emboss=False)
+        sub = row.row()
+        sub.enabled = group.show
+        sub.prop(group, "gain", text=group.name, translate=False)
+
+
+class ARTO_UL_looks(bpy.types.UIList):
+    """Looks by name, with their plates."""
+
+    def draw_item(
+        self, context, layout, _data, item, _icon, _active_data, _active_property, _index
+    ) -> None:
+        icon = 0
+        with contextlib.suppress(ArtoError):  # of a file that was never saved
+            icon = thumbnails.of_plate(paths.relit_file(context.scene, item.name))
+        row = layout.row(align=True)
+        if icon:
+            row.template_icon(icon, scale=1.0)
+        else:
+            row.label(text="", icon="IMAGE_DATA")
+        row.prop(item, "name", text="", emboss=False)
+
+
+def _looks(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    settings = context.scene.arto
+    column.separator(factor=0.5)
+    if not settings.looks:
+        column.operator("arto.add_look", text="Keep This Light as a Look", icon="ADD")
+        return
+    row = column.row()
+    row.template_list("ARTO_UL_looks", "", settings, "looks", settings, "active_look", rows=3)
+    buttons = row.column(align=True)
+    buttons.operator("arto.add_look", text="", icon="ADD")
+    buttons.operator("arto.remove_look", text="", icon="REMOVE")
+    column.operator("arto.relight_looks", icon="RENDERLAYERS")

@@ -1,0 +1,181 @@
+"""Clicking into pictures: a pixel of the plate, a place of the HDRI."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import ArtoError
+from ..live.live import IMAGE as LIVE
+from ..relight import compare, inside
+from ..relight.plate import name_of
+from ..world import controls
+from ..world.check import world_of
+from .operators import Quick, can_relight, free
+from .reveal import reveal
+
+
+def image_of(name: str, picture: NDArray[np.float32], display: bool = False) -> bpy.types.Image:
+    """A picture (H, W, 4), rows top-down, as an image of the window. display: it is as a display
+    shows it, and no scene."""
+    height, width = picture.shape[:2]
+    image = bpy.data.images.get(name)
+    if image is not None and (image.source != "GENERATED" or tuple(image.size) != (width, height)):
+        bpy.data.images.remove(image)
+        image = None
+    if image is None:
+        image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=True)
+        image.colorspace_settings.name = bpy.data.colorspace.working_space
+        image.alpha_mode = "PREMUL"
+        image.use_view_as_render = not display
+    image.pixels.foreach_set(np.ascontiguousarray(picture[::-1], np.float32).ravel())
+    image.update()
+    return image
+
+
+def under(context: bpy.types.Context, event: bpy.types.Event) -> tuple[Any, float, float] | None:
+    """The image editor under the mouse, and where in its picture it is: u, v from the left and the
+    bottom, 0 to 1."""
+    for area in context.window.screen.areas:
+        if area.type != "IMAGE_EDITOR" or area.spaces.active.image is None:
+            continue
+        region = next(r for r in area.regions if r.type == "WINDOW")
+        x, y = event.mouse_x - region.x, event.mouse_y - region.y
+        if 0 <= x < region.width and 0 <= y < region.height:
+            covered = [r for r in area.regions if r.type in {"UI", "TOOLS", "HEADER"}]
+            if any(
+                r.x <= event.mouse_x < r.x + r.width and r.y <= event.mouse_y < r.y + r.height
+                for r in covered
+                if r.width > 1
+            ):
+                return None
+            u, v = region.view2d.region_to_view(x, y)
+            return area.spaces.active, u, v
+    return None
+
+
+class _Picking(Quick):
+    """An operator that waits for a click into a picture."""
+
+    hint = ""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not free(cls):
+            return False
+        return can_relight(cls, context)
+
+    def begin(self, context: bpy.types.Context) -> None:
+        """Before the click. Raises ArtoError."""
+
+    def picked(self, context: bpy.types.Context, space: Any, u: float, v: float) -> str:
+        raise NotImplementedError
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        try:
+            self.begin(context)
+        except ArtoError as e:
+            self.report({"ERROR"}, str(e))
+            return {"CANCELLED"}
+        context.window.cursor_modal_set("EYEDROPPER")
+        context.workspace.status_text_set(f"{self.hint}   (ESC: leave)")
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        self.report({"ERROR"}, "this is a button for a mouse: it waits for a click")
+        return {"CANCELLED"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if event.type in {"ESC", "RIGHTMOUSE"}:
+            self._leave(context)
+            return {"CANCELLED"}
+        if event.type != "LEFTMOUSE" or event.value != "PRESS":
+            # zooming and panning go on
+            return {"PASS_THROUGH"}
+        there = under(context, event)
+        if there is None:
+            return {"RUNNING_MODAL"}
+        self._leave(context)
+        try:
+            text = self.picked(context, *there)
+        except ArtoError as e:
+            self.report({"ERROR"}, str(e))
+            return {"CANCELLED"}
+        context.window_manager.arto.seen = text
+        self.report({"INFO"}, text.splitlines()[0])
+        for area in context.window.screen.areas:
+            area.tag_redraw()
+        return {"FINISHED"}
+
+    def _leave(self, context: bpy.types.Context) -> None:
+        context.window.cursor_modal_restore()
+        context.workspace.status_text_set(None)
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        self._leave(context)
+
+
+class ARTO_OT_look_inside(_Picking):
+    """Click a pixel of the relit picture: shows where its light comes from, on the unfolded \
+patches with the HDRI on them"""
+
+    bl_idname = "arto.look_inside"
+    bl_label = "Look Inside"
+    hint = "Click a pixel of the relit picture"
+
+    def begin(self, context: bpy.types.Context) -> None:
+        scene = context.scene
+        showing = {s.image.name for s in _spaces(context) if s.image}
+        if not showing & {name_of(scene), LIVE, inside.FROM}:
+            bpy.ops.arto.show_plate()
+
+    def picked(self, context: bpy.types.Context, space: Any, u: float, v: float) -> str:
+        if space.image.name in {inside.IMAGE, compare.IMAGE}:
+            bpy.ops.arto.show_plate()
+            return "That is no pixel of the relit picture: it is shown now, click again"
+        width, height = space.image.size
+        x, y = int(np.floor(u * width)), int(np.floor((1 - v) * height))
+        found = inside.look(context.scene, x, y)
+        space.image = image_of(inside.IMAGE, found.picture, display=True)
+        return "\n".join(found.lines)
+
+
+class ARTO_OT_light_from(_Picking):
+    """Click a place of the HDRI, or of the unfolded patches: the picture shows what the light \
+from there gives to it"""
+
+    bl_idname = "arto.light_from"
+    bl_label = "Light from Here"
+    hint = "Click a place of the HDRI"
+
+    def begin(self, context: bpy.types.Context) -> None:
+        scene = context.scene
+        world = world_of(scene)
+        hdri = controls.hdri(world) if world else None
+        showing = {s.image.name for s in _spaces(context) if s.image}
+        if inside.IMAGE in showing or (hdri and hdri.name in showing):
+            return
+        shown = inside.Shown(scene, inside.layer_of(scene))
+        environment = inside.environment_of(scene)
+        picture = inside.drawn(shown.field.hemicube, environment, [], inside.SIDE, show=0.0)
+        reveal(image_of(inside.IMAGE, picture, display=True))
+
+    def picked(self, context: bpy.types.Context, space: Any, u: float, v: float) -> str:
+        direction = inside.direction_at(context.scene, space.image.name, u, v)
+        if direction is None:
+            return "That is beside the patches: click on them"
+        picture, text = inside.light_from(context.scene, direction)
+        space.image = image_of(inside.FROM, picture)
+        return text
+
+
+def _spaces(context: bpy.types.Context) -> list[Any]:
+    areas = [a for w in context.window_manager.windows for a in w.screen.areas]
+    return [a.spaces.active for a in areas if a.type == "IMAGE_EDITOR"]
+
+
+CLASSES = (ARTO_OT_look_inside, ARTO_OT_light_from)

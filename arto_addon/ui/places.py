@@ -1,0 +1,99 @@
+"""Where ARTO's panels are: a tab in the sidebars of the 3D viewport, the image editor and the
+compositor, and the render properties, which have the closed ones too."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import Any
+
+import bpy
+
+# Space, region, and what the names of panels there end in.
+SIDEBARS = (
+    ("VIEW_3D", "UI", "view"),
+    ("IMAGE_EDITOR", "UI", "image"),
+    ("NODE_EDITOR", "UI", "nodes"),
+)
+TAB = "ARTO"
+# Of a letter in Blender's interface, pixels at a scale of 1, on average and with room to spare.
+_LETTER = 6.2
+
+
+class Draws:
+    """What a panel has in common with its like elsewhere: a title and `draw_column`."""
+
+    label = ""
+    closed = False
+
+    @staticmethod
+    def shown(context: bpy.types.Context) -> bool:
+        return True
+
+    @staticmethod
+    def draw_column(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
+        raise NotImplementedError
+
+
+def panels(name: str, draws: type[Draws], sidebar: bool = True, parent: str = "") -> list[type]:
+    """The panel classes of one title, one for each place.
+
+    sidebar: whether it is in the sidebars too; parent: name of the one it is in.
+    """
+    places: list[tuple[str, str, str]] = [*SIDEBARS] if sidebar else []
+    places.append(("PROPERTIES", "WINDOW", "render"))
+    return [_panel(name, draws, *place, parent) for place in places]
+
+
+def _panel(name: str, draws: type[Draws], space: str, region: str, end: str, parent: str) -> type:
+    def poll(cls: type, context: bpy.types.Context) -> bool:
+        if space == "NODE_EDITOR" and context.space_data.tree_type != "CompositorNodeTree":
+            return False
+        return draws.shown(context)
+
+    def draw(self: Any, context: bpy.types.Context) -> None:
+        draws.draw_column(self.layout.column(), context)
+
+    attributes: dict[str, Any] = {
+        "bl_label": draws.label,
+        "bl_idname": f"ARTO_PT_{name}_{end}",
+        "bl_space_type": space,
+        "bl_region_type": region,
+        "poll": classmethod(poll),
+        "draw": draw,
+        "__doc__": draws.__doc__,
+    }
+    if draws.closed:
+        attributes["bl_options"] = {"DEFAULT_CLOSED"}
+    if space == "PROPERTIES":
+        attributes["bl_context"] = "render"
+        attributes["bl_parent_id"] = f"ARTO_PT_{parent or 'main'}_{end}"
+        if name == "main":
+            del attributes["bl_parent_id"]
+    else:
+        attributes["bl_category"] = TAB
+        if parent:
+            attributes["bl_parent_id"] = f"ARTO_PT_{parent}_{end}"
+    return type(attributes["bl_idname"], (bpy.types.Panel,), attributes)
+
+
+def say(
+    column: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE"
+) -> None:
+    """A sentence, in as many lines as the region needs: a label is clipped at its end."""
+    scale = context.preferences.system.ui_scale
+    room = (context.region.width if context.region else 300) / scale
+    # what the frame of a panel, its scroll bar, and an icon take
+    letters = max(12, int((room - 56 - (22 if icon != "NONE" else 0)) / _LETTER))
+    lines = column.column(align=True)
+    lines.scale_y = 0.8
+    text = bpy.app.translations.pgettext_iface(text)
+    for i, line in enumerate(_lines(text, letters)):
+        first = icon if i == 0 else ("NONE" if icon == "NONE" else "BLANK1")
+        lines.label(text=line, icon=first, translate=False)
+
+
+def _lines(text: str, letters: int) -> list[str]:
+    """A text in lines; one that has no blanks, as in Japanese, is broken anywhere, and its letters
+    are twice as wide."""
+    wide = any(ord(c) > 0x2E80 for c in text)
+    return textwrap.wrap(text, letters // 2 if wide else letters) or [""]

@@ -1,0 +1,108 @@
+"""Buttons of the panel Result."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+from ...core.errors import SceneError
+from ..live import live
+from ..relight import compare
+from ..relight.composite import save_composite
+from ..relight.plate import name_of, show
+from ..relight.verify import verify_plate
+from ..shot import paths
+from ..work import Steps
+from .long_work import LongWork
+from .operators import Quick, free
+from .reveal import reveal
+
+
+def _has_plate(cls: type, context: bpy.types.Context) -> bool:
+    try:
+        path: Path | None = paths.relit_file(context.scene)
+    except SceneError as e:
+        cls.poll_message_set(str(e))
+        return False
+    if path is None or not path.is_file():
+        cls.poll_message_set("There is no relit picture yet: press Relight")
+        return False
+    return True
+
+
+class ARTO_OT_show_plate(Quick):
+    """Show the relit picture in an image editor"""
+
+    bl_idname = "arto.show_plate"
+    bl_label = "Show"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _has_plate(cls, context)
+
+    def work(self, context: bpy.types.Context) -> str:
+        scene = context.scene
+        path = paths.relit_file(scene)
+        image = bpy.data.images.get(name_of(scene)) or show(path, name_of(scene))
+        reveal(image)
+        return f"shown is {path.name}"
+
+
+class ARTO_OT_compare(Quick):
+    """Show the relit picture beside the last render of Blender's"""
+
+    bl_idname = "arto.compare"
+    bl_label = "Compare"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _has_plate(cls, context)
+
+    def work(self, context: bpy.types.Context) -> str:
+        reveal(compare.begin(context.scene))
+        return "left is the relit picture, right the render"
+
+
+class ARTO_OT_verify(LongWork):
+    """Render a few samples of the truth in the background, and show where the relit picture \
+differs from them by more than their noise"""
+
+    bl_idname = "arto.verify"
+    bl_label = "Verify"
+    verb = "verify"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return free(cls) and _has_plate(cls, context)
+
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
+        return verify_plate(scene, view_layer)
+
+
+class ARTO_OT_save_composite(Quick):
+    """Save what the scene's compositor makes of the relit picture, in the scene's output format, \
+without rendering"""
+
+    bl_idname = "arto.save_composite"
+    bl_label = "Save Composite"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if bpy.app.is_job_running("RENDER"):
+            cls.poll_message_set("Blender is rendering: wait until it is done")
+            return False
+        return free(cls) and _has_plate(cls, context)
+
+    def work(self, context: bpy.types.Context) -> str:
+        if live.current is not None:
+            live.put_away(live.current.name)
+        return f"wrote {save_composite(context.scene)}"
+
+
+CLASSES = (
+    ARTO_OT_show_plate,
+    ARTO_OT_compare,
+    ARTO_OT_verify,
+    ARTO_OT_save_composite,
+)

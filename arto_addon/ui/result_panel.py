@@ -1,0 +1,149 @@
+"""The panel *Result*: the plate, how it compares, and where it goes."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import bpy
+
+from ...core import exr
+from ...core.errors import ArtoError
+from ..job import session
+from ..relight.light_key import HEADER, light_key
+from ..relight.verify import verify_file
+from ..shot import paths, status
+from ..shot.shot import layer_of
+from ..world.check import world_of
+from . import shot_panel, thumbnails
+from .places import Draws, say
+
+# Seconds for which what was found holds: a panel is drawn with every move of the mouse.
+_HOLDS = 0.4
+_last: dict[str, tuple[float, tuple[str, bool]]] = {}
+_headers: dict[Path, tuple[int, dict]] = {}
+
+
+def header_of(path: Path) -> dict:
+    """The header of a plate, read when it has changed. Raises OSError, ExrError."""
+    changed = path.stat().st_mtime_ns
+    if path not in _headers or _headers[path][0] != changed:
+        if len(_headers) > 50:
+            _headers.clear()
+        _headers[path] = changed, exr.header(path)
+    return _headers[path][1]
+
+
+def plate_line(scene: bpy.types.Scene) -> tuple[str, bool]:
+    """What there is of a plate, in words, and whether it is up to date; empty for nothing."""
+    key = f"{scene.session_uid} {scene.arto.look}"
+    at, found = _last.get(key, (-1.0, ("", False)))
+    now = time.monotonic()
+    if bpy.app.background or now - at > _HOLDS:
+        found = _plate_line(scene)
+        _last[key] = now, found
+    return found
+
+
+def _plate_line(scene: bpy.types.Scene) -> tuple[str, bool]:
+    try:
+        path = paths.relit_file(scene)
+        header = header_of(path)
+        written = path.stat().st_mtime
+        world = world_of(scene)
+        layer = layer_of(scene)
+        source = paths.place(scene, layer, fresh=bpy.app.background).source
+    except (ArtoError, OSError):
+        return "", False
+    look = scene.arto.look.strip()
+    name = f"Look '{look}', " if look else ""
+    text = f"{name}{time.strftime('%H:%M', time.localtime(written))}"
+    field = source / "field" / "field.json"
+    if field.is_file() and field.stat().st_mtime > written:
+        return f"{text}, of an earlier capture", False
+    if world is None or header.get(HEADER) != light_key(scene, world):
+        return f"{text}, the light changed since", False
+    return f"{text}, up to date", True
+
+
+class Result(Draws):
+    """The relit picture, and what is done with it"""
+
+    label = "Result"
+
+    @staticmethod
+    def draw_column(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
+        scene, settings = context.scene, context.scene.arto
+        text, good = plate_line(scene)
+        try:
+            path: Path | None = paths.relit_file(scene)
+        except ArtoError:
+            path = None
+        if text and path:
+            icon = thumbnails.of_plate(path)
+            if icon:
+                row = column.row()
+                row.alignment = "CENTER"
+                row.template_icon(icon, scale=5.0)
+            say(column, context, text, "CHECKMARK" if good else "ERROR")
+        row = column.row(align=True)
+        row.scale_y = 1.3
+        # it stands out while there is something to do
+        row.alert = bool(text) and not good and session.current is None
+        row.operator("arto.relight", icon="WORLD")
+        if session.current is None:
+            shot_panel.ended(
+                column, context, ("relight", "relight_frames", "relight_looks", "verify")
+            )
+        if not text:
+            if status.field_line(scene) is None:
+                say(column, context, "Capture the shot first", "INFO")
+            return
+        row = column.row(align=True)
+        row.operator("arto.show_plate", icon="IMAGE_DATA")
+        row.operator("arto.compare", icon="ARROW_LEFTRIGHT")
+        if settings.compare != "OFF":
+            column.prop(settings, "compare", text="")
+            if settings.compare == "WIPE":
+                column.prop(settings, "wipe", slider=True)
+        column.operator("arto.look_inside", icon="EYEDROPPER")
+        column.operator("arto.light_from", icon="LIGHT")
+        _seen(column, context)
+        column.operator("arto.verify", icon="VIEWZOOM")
+        _verified(column, context, path)
+        column.separator(factor=0.5)
+        column.prop(settings, "use_in_compositor", text="")
+        column.operator("arto.save_composite", icon="FILE_TICK")
+        if path:
+            say(column, context, _short(path), "FILE_IMAGE")
+
+
+def _short(path: Path) -> str:
+    """A path as a file of the artist's is called: from the .blend on."""
+    if bpy.data.filepath:
+        try:
+            return bpy.path.relpath(str(path))
+        except ValueError:  # another drive
+            pass
+    return str(path)
+
+
+def _seen(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """What the last look inside found."""
+    for line in context.window_manager.arto.seen.splitlines():
+        say(column, context, line)
+
+
+def _verified(column: bpy.types.UILayout, context: bpy.types.Context, path: Path | None) -> None:
+    """What Verify found, if it was of this plate."""
+    if path is None:
+        return
+    found = verify_file(path)
+    try:
+        if found.stat().st_mtime < path.stat().st_mtime:
+            return
+        text = str(header_of(found).get("arto.verify", ""))
+    except (OSError, ArtoError):
+        return
+    if text:
+        say(column, context, text[0].upper() + text[1:], "INFO")

@@ -1,0 +1,214 @@
+"""Buttons of the panels Shot and Light: the one button, the way back, looks, an HDRI."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import bpy
+from bpy.props import StringProperty
+
+from ...core.errors import SceneError
+from ...core.files import Lock
+from ..capture.check import check_scene
+from ..relight import looks
+from ..relight.looks import relight_looks
+from ..shoot import shoot
+from ..shot import paths
+from ..shot.shot import layer_of
+from ..work import Steps
+from ..world import controls
+from ..world.check import world_of
+from . import state
+from .long_work import LongWork
+from .operators import Quick, can_capture, can_relight, free
+
+
+class ARTO_OT_shoot(LongWork):
+    """Capture how the shot answers light from every direction, and show it in its light"""
+
+    bl_idname = "arto.shoot"
+    bl_label = "Capture"
+    verb = "shoot"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        found = state.told(context.scene)
+        if found.kind == "blocked":
+            cls.poll_message_set(" ".join(found.lines))
+            return False
+        return can_capture(cls, context)
+
+    def check(self, scene: bpy.types.Scene) -> None:
+        check_scene(scene)
+
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
+        return shoot(scene, view_layer)
+
+
+class ARTO_OT_set_back(Quick):
+    """Set camera, frame and size back to those of what was captured"""
+
+    bl_idname = "arto.set_back"
+    bl_label = "Set Back"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def work(self, context: bpy.types.Context) -> str:
+        scene = context.scene
+        then = state.captured_shot(scene)
+        if then is None:
+            raise SceneError("nothing of this scene was captured yet")
+        camera = scene.objects.get(then.camera or "")
+        if camera is None:
+            raise SceneError(f"the camera '{then.camera}' is not in the scene any more")
+        scene.camera = camera
+        scene.frame_set(then.frame, subframe=then.subframe or 0.0)
+        render = scene.render
+        share = render.resolution_percentage
+        size = render.resolution_x * share // 100, render.resolution_y * share // 100
+        if size != (then.width, then.height):
+            render.resolution_percentage = 100
+            render.resolution_x, render.resolution_y = then.width, then.height
+        left = then.difference(state.shot_of(scene, layer_of(scene)))
+        if left:
+            return f"set back to {then.title}; what is left is {left}"
+        return f"set back to {then.title}"
+
+
+class ARTO_OT_delete_capture(Quick):
+    """Delete the rendered images of this capture; what relighting reads stays"""
+
+    bl_idname = "arto.delete_capture"
+    bl_label = "Delete Capture, Keep Relighting"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return free(cls)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return context.window_manager.invoke_confirm(self, event)
+
+    def work(self, context: bpy.types.Context) -> str:
+        scene = context.scene
+        place = paths.place(scene, layer_of(scene))
+        if place.owner:
+            raise SceneError(f"what is there is of {place.owner}")
+        if not (place.folder / "field").is_dir():
+            raise SceneError("nothing would be left to relight with: fit the capture first")
+        with Lock(place.folder, "deleting"):
+            for take in ("", "ground", "things"):
+                folder = place.folder / take / "capture"
+                if folder.is_dir():
+                    try:
+                        shutil.rmtree(folder)
+                    except OSError as e:
+                        raise SceneError(f"{folder} cannot be removed ({e})") from e
+        paths.forget()
+        return "deleted the capture; the shot can still be relit"
+
+
+class ARTO_OT_open_hdri(Quick):
+    """Light the scene with an HDRI from a file"""
+
+    bl_idname = "arto.open_hdri"
+    bl_label = "Open HDRI"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filepath: StringProperty(subtype="FILE_PATH")
+    filter_glob: StringProperty(default="*.exr;*.hdr;*.png;*.jpg;*.tif", options={"HIDDEN"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def work(self, context: bpy.types.Context) -> str:
+        scene = context.scene
+        try:
+            image = bpy.data.images.load(self.filepath, check_existing=True)
+        except RuntimeError as e:
+            raise SceneError(f"{self.filepath} cannot be read ({e}): choose an HDRI") from e
+        world = world_of(scene)
+        if world is None:
+            world = bpy.data.worlds.new(Path(self.filepath).stem)
+            scene.world = world
+        if world.library:
+            raise SceneError("the world is linked from a library: make it local to change it")
+        controls.set_hdri(world, image)
+        return f"the world shows {image.name}"
+
+
+class ARTO_OT_add_look(Quick):
+    """Keep the light as it is now as a look: its world, and a plate of its own. Where a look is \
+shown, a copy of it is added, to go on from"""
+
+    bl_idname = "arto.add_look"
+    bl_label = "Add Look"
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: StringProperty(name="Name", description="What the look is called", default="")
+
+    def work(self, context: bpy.types.Context) -> str:
+        return f"added the look '{looks.add(context.scene, self.name).name}'"
+
+
+class ARTO_OT_remove_look(Quick):
+    """Remove the look that is shown; its plate stays on disk"""
+
+    bl_idname = "arto.remove_look"
+    bl_label = "Remove Look"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        settings = context.scene.arto
+        if not 0 <= settings.active_look < len(settings.looks):
+            cls.poll_message_set("No look is chosen")
+            return False
+        return True
+
+    def work(self, context: bpy.types.Context) -> str:
+        return f"removed the look '{looks.remove(context.scene)}'"
+
+
+class ARTO_OT_relight_looks(LongWork):
+    """Relight the shot in each of its looks: a plate for each"""
+
+    bl_idname = "arto.relight_looks"
+    bl_label = "Relight All"
+    verb = "relight_looks"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not context.scene.arto.looks:
+            cls.poll_message_set("There are no looks yet: add one")
+            return False
+        return free(cls) and can_relight(cls, context)
+
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
+        return relight_looks(scene, view_layer)
+
+
+class ARTO_OT_open_guide(Quick):
+    """Ten minutes from install to a plate in comp"""
+
+    bl_idname = "arto.open_guide"
+    bl_label = "Guide"
+
+    def work(self, context: bpy.types.Context) -> str:
+        guide = Path(__file__).resolve().parents[2] / "docs" / "guide.md"
+        if not guide.is_file():
+            raise SceneError(f"the guide is not where it was installed: {guide}")
+        bpy.ops.wm.url_open(url=guide.as_uri())
+        return f"the guide is {guide}"
+
+
+CLASSES = (
+    ARTO_OT_shoot,
+    ARTO_OT_set_back,
+    ARTO_OT_delete_capture,
+    ARTO_OT_open_hdri,
+    ARTO_OT_add_look,
+    ARTO_OT_remove_look,
+    ARTO_OT_relight_looks,
+    ARTO_OT_open_guide,
+)

@@ -1,0 +1,125 @@
+"""The panel *Shot*: which picture, what there is of it, and one large button."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..job import session
+from ..job.session import Job
+from ..job.task import clock
+from ..shot import status
+from ..stage.settings import looks_otherwise, samples_of
+from ..stage.stage import picture_size
+from . import state
+from .places import Draws, say
+
+_ICONS = {
+    "blocked": "ERROR",
+    "none": "RADIOBUT_OFF",
+    "unfinished": "PAUSE",
+    "unfitted": "PAUSE",
+    "ready": "CHECKMARK",
+    "changed": "ERROR",
+    "elsewhere": "ERROR",
+    "other": "QUESTION",
+}
+
+
+class Shot(Draws):
+    """Which picture this is, whether it is captured, and the button that captures it"""
+
+    label = "Shot"
+
+    @staticmethod
+    def draw_column(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
+        scene = context.scene
+        width, height = picture_size(scene)
+        camera = scene.camera.name if scene.camera else "no camera"
+        text = f"{camera}, frame {scene.frame_current}, {width} x {height}"
+        say(column, context, text, "CAMERA_DATA")
+        found = state.told(scene)
+        for i, line in enumerate(found.lines):
+            say(column, context, line, _ICONS[found.kind] if i == 0 else "BLANK1")
+        if scene.render.use_border and found.kind != "blocked":
+            say(column, context, "Only the render region is captured", "INFO")
+        if caution := status.caution_line(scene):
+            say(column, context, caution[0], "ERROR")
+        if found.kind == "elsewhere":
+            column.operator("arto.set_back", icon="LOOP_BACK")
+        if found.kind == "other":
+            column.operator("arto.adopt", icon="CHECKMARK")
+        if job := session.current:
+            running(column, context, job)
+            return
+        _buttons(column, context, found)
+        ended(column, context, ("capture", "shoot", "fit", "capture_frames"))
+
+
+def _buttons(column: bpy.types.UILayout, context: bpy.types.Context, found: state.Told) -> None:
+    scene = context.scene
+    column.separator(factor=0.5)
+    row = column.row(align=True)
+    row.prop(scene.arto, "quality", text="")
+    if scene.arto.quality == "CUSTOM":
+        row.prop(scene.arto, "samples", text="")
+    big = column.row(align=True)
+    big.scale_y = 1.6
+    # what is there already stands back behind what is to be done
+    big.operator("arto.shoot", text=found.button, icon="RENDER_STILL")
+    if "done" in " ".join(found.lines):
+        big.operator("arto.discard_unfinished", text="", icon="TRASH")
+    if found.kind == "blocked":
+        return
+    for line in state.price(scene, found.button == "Continue"):
+        say(column, context, line[0].upper() + line[1:])
+    for text in looks_otherwise(scene):
+        say(column, context, text, "INFO")
+
+
+def running(column: bpy.types.UILayout, context: bpy.types.Context, job: Job) -> None:
+    """One bar over everything, what is done, and a cross."""
+    column.separator(factor=0.5)
+    text = session.plain(job.state.text)
+    say(column, context, text[0].upper() + text[1:])
+    row = column.row(align=True)
+    row.scale_y = 1.3
+    row.progress(factor=job.state.share, text=f"{job.state.share:.0%}")
+    row.operator("arto.cancel", text="", icon="X")
+    left = "" if job.state.left is None else f", {clock(job.state.left)} left"
+    line = "Stopping" if job.told else f"{clock(job.spent)} spent{left}"
+    say(column, context, line)
+
+
+def ended(column: bpy.types.UILayout, context: bpy.types.Context, verbs: tuple[str, ...]) -> None:
+    """How the last piece of work ended, if it was one of these and went wrong or was stopped."""
+    found = session.outcome
+    if found is None or found.verb not in verbs or found.level == "INFO":
+        return
+    icon = {"WARNING": "INFO", "ERROR": "CANCEL"}[found.level]
+    say(column, context, found.text[0].upper() + found.text[1:], icon)
+
+
+class Quality(Draws):
+    """How good, and how long it takes"""
+
+    label = "Quality"
+    closed = True
+
+    @staticmethod
+    def draw_column(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
+        from ..relight import denoise
+
+        scene, settings = context.scene, context.scene.arto
+        column.prop(settings, "quality", text="Capture")
+        if settings.quality == "CUSTOM":
+            column.prop(settings, "samples")
+        say(column, context, f"{samples_of(scene)} samples a pixel")
+        sub = column.column()
+        sub.enabled = denoise.known() is not False
+        sub.prop(settings, "denoise")
+        if denoise.known() is False:
+            say(column, context, "This Blender was built without Open Image Denoise", "INFO")
+        column.prop(settings, "lamps")
+        if settings.lamps:
+            column.prop(settings, "lamp_samples")
+        column.prop(settings, "environment_width")

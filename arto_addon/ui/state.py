@@ -1,0 +1,158 @@
+"""What the artist is told of a shot, in two short lines, and what its one button does next."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+
+from ...core import capture_set, field
+from ...core.errors import ArtoError
+from ...core.shot import Shot
+from ..capture.planned import most
+from ..capture.room import size
+from ..job.task import clock
+from ..shot import paths, status
+from ..shot.shot import layer_of, shot_of
+from ..stage.settings import samples_of
+from ..stage.stage import picture_region
+
+# Seconds of a path on one core, until one was measured on this scene.
+_GUESS = 5e-6
+# And of all that is no path: starting, probing, fitting the last tile.
+OTHERS = 8.0
+
+
+@dataclass(frozen=True)
+class Told:
+    """kind: `blocked`, `none`, `unfinished`, `unfitted`, `ready`, `changed`, `elsewhere` (captured
+    of another camera, frame or size), `other` (captured for another file or scene); lines: at most
+    two; button: what the large one says; ok: whether a relight serves."""
+
+    kind: str
+    lines: tuple[str, ...]
+    button: str
+    ok: bool = False
+
+
+def told(scene: bpy.types.Scene) -> Told:
+    """What there is of the scene's shot."""
+    if scene.render.engine != "CYCLES":
+        return Told("blocked", ("ARTO captures with Cycles:", "choose it as the engine"), "Capture")
+    if scene.camera is None:
+        return Told("blocked", ("The scene has no camera",), "Capture")
+    layer = layer_of(scene)
+    try:
+        place = paths.place(scene, layer, fresh=bpy.app.background)
+    except ArtoError:
+        return Told("blocked", ("This file was never saved:", "save it first"), "Capture")
+    except OSError as e:
+        return Told("blocked", ("The folder cannot be read:", str(e.strerror)), "Capture")
+    if place.owner:
+        return Told("other", (f"Captured for {place.owner}",), "Capture")
+    stopped = status.unfinished(place.source)
+    field_line = status.field_line(scene, layer)
+    capture_line = status.capture_line(scene, layer)
+    if field_line is None and capture_line is None:
+        return Told("none", ("No capture yet",), "Capture")
+    if field_line is None and stopped:
+        return Told("unfinished", (f"{stopped[0]} done,", "continues where it stopped"), "Continue")
+    if field_line is None and not (place.source / "capture").exists():
+        then = paths.nearest(scene, layer)
+        if then is not None:
+            return Told("elsewhere", (_elsewhere(then, shot_of(scene, layer)),), "Capture This Too")
+    if field_line is None:
+        return Told("unfitted", ("Captured, but not fitted yet",), "Continue")
+    text, serves = field_line
+    more = (f"Another capture: {stopped[0]} done",) if stopped else ()
+    if not serves:
+        then = _shot(place.source)
+        if then is not None and then.difference(shot_of(scene, layer)):
+            text = _elsewhere(then, shot_of(scene, layer))
+            return Told("elsewhere", (text, *more), "Continue" if more else "Capture Again")
+        text = text[0].upper() + text[1:]
+        return Told("changed", (text, *more), "Continue" if more else "Capture Again", True)
+    about = status.field_of(place.source)
+    when = _when(place.source / "field" / field.HEADER)
+    samples = about.about.get("samples", "?") if about else "?"
+    text = f"Ready, captured {when}, {samples} samples"
+    return Told("ready", (text, *more), "Continue" if more else "Capture Again", True)
+
+
+def _elsewhere(then: Shot, now: Shot) -> str:
+    """How another shot of the scene differs from this one, as an artist says it."""
+    if then.camera != now.camera:
+        return f"Captured through {then.camera}, the camera is {now.camera}"
+    if then.frame != now.frame or (then.subframe or 0) != (now.subframe or 0):
+        return f"Captured at frame {then.frame}, this is frame {now.frame}"
+    if (then.width, then.height) != (now.width, now.height):
+        return (
+            f"Captured at {then.width} x {then.height}, the picture is {now.width} x {now.height}"
+        )
+    if then.view_layer != now.view_layer:
+        return f"Captured of the view layer {then.view_layer}, this is {now.view_layer}"
+    difference = then.difference(now) or "another shot"
+    return "The camera has moved since" if "camera" in difference else f"Captured of {difference}"
+
+
+def _shot(source: Path) -> Shot | None:
+    there = status.field_of(source)
+    try:
+        return Shot.from_json(there.about.get("shot")) if there else None
+    except ArtoError:
+        return None
+
+
+def captured_shot(scene: bpy.types.Scene) -> Shot | None:
+    """The shot that what is there was captured of, or the nearest one of the scene. Raises
+    SceneError."""
+    layer = layer_of(scene)
+    place = paths.place(scene, layer)
+    return _shot(place.source) or paths.nearest(scene, layer)
+
+
+def _when(path: Path) -> str:
+    """When a file was written: the time today, the day before."""
+    at, now = time.localtime(path.stat().st_mtime), time.localtime()
+    same = at[:3] == now[:3]
+    return time.strftime("%H:%M" if same else "%d %b", at)
+
+
+def price(scene: bpy.types.Scene, unfinished: bool = False) -> tuple[str, ...]:
+    """What a capture takes, in two lines: time, and disk. Raises nothing: a panel asks."""
+    try:
+        found = most(scene)
+        pixels = picture_region(scene).pixels
+    except ArtoError as e:
+        return (str(e),)
+    samples = samples_of(scene)
+    left, known = _seconds(scene, pixels * samples, unfinished)
+    about = "about" if known else "perhaps"
+    first = f"{about} {clock(left)}, {samples} samples"
+    return first, f"{size(found.disk)} while it runs, keeps {size(found.kept)}"
+
+
+def _seconds(scene: bpy.types.Scene, paths_traced: int, unfinished: bool) -> tuple[float, bool]:
+    """How long, and whether it was measured on this shot."""
+    try:
+        source = paths.place(scene, layer_of(scene), fresh=bpy.app.background).source
+    except (ArtoError, OSError):
+        source = None
+    if source is not None:
+        headers = [*source.glob("unfinished-*/" + capture_set.HEADER)] if unfinished else []
+        headers.append(source / "capture" / capture_set.HEADER)
+        for header in headers:
+            there = status.capture_at(header)
+            if there is None or not there.head.get("seconds"):
+                continue
+            done = [t for t in there.head["tiles"] if t["done"]]
+            traced = sum(t["region"][2] * t["region"][3] for t in done) * there.head["samples"]
+            if not traced:
+                continue
+            whole = there.head["seconds"] * paths_traced / traced
+            share = 1 - len(done) / len(there.head["tiles"]) if unfinished else 1.0
+            return OTHERS + whole * (share or 1.0), True
+    return OTHERS + paths_traced * _GUESS / (os.cpu_count() or 1), False

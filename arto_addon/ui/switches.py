@@ -1,0 +1,134 @@
+"""What is of the window and in no file: switches, the world's dials, and what was looked at."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+from ...core.errors import ArtoError
+from ..live import live
+from ..world import controls
+from . import overlay
+
+
+def _get_live(self: Any) -> bool:
+    return live.current is not None
+
+
+def _set_live(self: Any, on: bool) -> None:
+    if not on:
+        live.stop()
+        return
+    try:
+        live.start(bpy.context.scene)
+    except ArtoError as e:
+        live.trouble = str(e)
+
+
+# named, because Blender reads annotations as texts, in which a lambda knows no module
+def _get_overlay(self: Any) -> bool:
+    return overlay.shown()
+
+
+def _set_overlay(self: Any, on: bool) -> None:
+    overlay.switch(on)
+
+
+def _get_turn(self: Any) -> float:
+    return controls.turn(self.id_data)
+
+
+def _set_turn(self: Any, angle: float) -> None:
+    controls.set_turn(self.id_data, angle)
+
+
+def _get_strength(self: Any) -> float:
+    return controls.strength(self.id_data)
+
+
+def _set_strength(self: Any, value: float) -> None:
+    controls.set_strength(self.id_data, value)
+
+
+def _get_tint(self: Any) -> tuple[float, float, float]:
+    return controls.tint(self.id_data)
+
+
+def _set_tint(self: Any, colour: Any) -> None:
+    controls.set_tint(self.id_data, colour)
+
+
+class ArtoWindow(bpy.types.PropertyGroup):
+    """Of the window."""
+
+    live: BoolProperty(
+        name="Live",
+        description="Follow every change of the world in the image editor while you make it: small "
+        "while it moves, whole when it rests, then with the HDRI's suns and denoised",
+        get=_get_live,
+        set=_set_live,
+        options={"SKIP_SAVE"},
+    )
+    overlay: BoolProperty(
+        name="Show Patches",
+        description="Draw the patches that the light comes from around the scene, with the HDRI on "
+        "them: in the 3D viewport alone, nothing of it is in the scene",
+        get=_get_overlay,
+        set=_set_overlay,
+        options={"SKIP_SAVE"},
+    )
+    seen: StringProperty(name="Seen", description="What the last look inside found")
+
+
+class ArtoWorld(bpy.types.PropertyGroup):
+    """A world's dials: of its own nodes where they are found, else of nodes that are put in."""
+
+    rotation: FloatProperty(
+        name="Rotation",
+        description="Turn of the HDRI about the vertical, in degrees, counterclockwise from above",
+        subtype="ANGLE",
+        soft_min=-math.pi,
+        soft_max=math.pi,
+        get=_get_turn,
+        set=_set_turn,
+    )
+    strength: FloatProperty(
+        name="Strength",
+        description="How bright the world is, as a factor of its HDRI",
+        min=0.0,
+        soft_max=5.0,
+        get=_get_strength,
+        set=_set_strength,
+    )
+    tint: FloatVectorProperty(
+        name="Tint",
+        description="A colour that the world's light is multiplied by; white leaves it as it is",
+        subtype="COLOR",
+        size=3,
+        min=0.0,
+        soft_max=1.0,
+        get=_get_tint,
+        set=_set_tint,
+    )
+
+
+CLASSES = (ArtoWindow, ArtoWorld)
+
+
+def register() -> None:
+    bpy.types.WindowManager.arto = PointerProperty(type=ArtoWindow, options={"SKIP_SAVE"})
+    bpy.types.World.arto = PointerProperty(type=ArtoWorld)
+
+
+def unregister() -> None:
+    del bpy.types.WindowManager.arto
+    del bpy.types.World.arto

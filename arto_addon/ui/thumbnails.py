@@ -1,0 +1,83 @@
+"""Small pictures for the panels: of plates and of HDRIs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import bpy.utils.previews
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core import exr
+from ...core.errors import ArtoError
+
+WIDTH = 192
+_pictures: list[Any] = []
+_written: dict[str, int] = {}
+
+
+def of_plate(path: Path) -> int:
+    """The icon of a plate on disk; 0 where there is none, or no window to show it."""
+    if not _pictures:
+        return 0
+    try:
+        changed = path.stat().st_mtime_ns
+    except OSError:
+        return 0
+    key = str(path)
+    if _written.get(key) == changed:
+        return _pictures[0][key].icon_id if key in _pictures[0] else 0
+    _written[key] = changed
+    try:
+        pixels = next(iter(exr.read(path).values()))
+    except ArtoError:
+        return 0
+    if key in _pictures[0]:
+        del _pictures[0][key]
+    return _put(key, displayed(pixels))
+
+
+def _put(key: str, picture: NDArray[np.float32]) -> int:
+    """A picture (h, w, 4) as a display shows it, in an icon."""
+    icon = _pictures[0].new(key)
+    height, width = picture.shape[:2]
+    side = max(height, width)
+    # an icon is square
+    square = np.zeros((side, side, 4), np.float32)
+    top, left = (side - height) // 2, (side - width) // 2
+    square[top : top + height, left : left + width] = picture
+    icon.image_size = (side, side)
+    icon.image_pixels_float.foreach_set(np.ascontiguousarray(square[::-1]).ravel())
+    return icon.icon_id
+
+
+def displayed(pixels: NDArray) -> NDArray[np.float32]:
+    """A scene-linear picture (H, W, 3 or 4), small and as a display shows it -> (h, w, 4)."""
+    step = max(1, -(-max(pixels.shape[:2]) // WIDTH))
+    h, w = pixels.shape[0] // step * step, pixels.shape[1] // step * step
+    blocks = pixels[:h, :w].reshape(h // step, step, w // step, step, -1)
+    small = blocks.mean(axis=(1, 3), dtype=np.float64)
+    light = np.maximum(small[..., :3], 0)
+    # a picture's middle is a display's, and its lights run out softly
+    light = light / (light + 0.6 * max(float(light.mean()), 1e-9) + 0.2)
+    alpha = small[..., 3:4] if small.shape[-1] > 3 else np.ones_like(light[..., :1])
+    return np.concatenate([light ** (1 / 2.2), np.clip(alpha, 0, 1)], axis=-1).astype(np.float32)
+
+
+def of_hdri(image: bpy.types.Image) -> int:
+    """The icon of an HDRI."""
+    preview = image.preview_ensure()
+    return preview.icon_id if preview else 0
+
+
+def register() -> None:
+    if not bpy.app.background:
+        _pictures.append(bpy.utils.previews.new())
+
+
+def unregister() -> None:
+    _written.clear()
+    while _pictures:
+        bpy.utils.previews.remove(_pictures.pop())
