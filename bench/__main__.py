@@ -194,6 +194,12 @@ def _flicker(options: argparse.Namespace) -> None:
     print(f"look at {options.sheet}")
 
 
+def _live(options: argparse.Namespace) -> None:
+    from .live import live_bench
+
+    live_bench(options.sizes, options.samples, options.json)
+
+
 def _plates(options: argparse.Namespace) -> None:
     from .plates import plates, table
 
@@ -322,6 +328,12 @@ def main() -> int:
     c.add_argument("--many", type=int, default=512, help="samples of each of two references")
     c.add_argument("--page", type=Path, help="a table in Markdown, to write")
     c.set_defaults(run=_plates)
+
+    c = commands.add_parser("live", help="updates a second while the light is changed")
+    c.add_argument("--json", type=Path, default=Path("out/live.json"))
+    c.add_argument("--sizes", nargs="+", help="480x270 960x540 1920x1080")
+    c.add_argument("--samples", type=int, default=16)
+    c.set_defaults(run=_live)
 
     c = commands.add_parser("patterns", help="what each set of patterns can identify")
     c.set_defaults(run=_patterns)

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 # Pixels a side, and how many standard errors a difference may be by chance.
 SIDE = 8
 CHANCE = 3.0
+# What is less off than this, of the light there, nobody sees.
+TELLING = 0.02
 
 
 @dataclass(frozen=True)
@@ -35,10 +37,14 @@ class Verdict:
         return f"Differs by more than noise in {self.share:.0%} of the picture"
 
 
-def verify(picture: NDArray, one: NDArray, two: NDArray, side: int = SIDE) -> Verdict:
+def verify(
+    picture: NDArray, one: NDArray, two: NDArray, side: int = SIDE, own: float = 0.0
+) -> Verdict:
     """Hold a picture (H, W, 3) against two renders of it with independent noise.
 
-    Scene-linear, premultiplied. What no render and no picture has light in counts as alike.
+    own: variance of the picture's own noise, in units of that of the two's mean: its capture is of
+    so many samples, and a denoiser leaves little of it. Scene-linear, premultiplied. What neither
+    has light in counts as alike.
     """
     truth = (one.astype(np.float64) + two) / 2
     half = (one.astype(np.float64) - two) / 2
@@ -50,7 +56,7 @@ def verify(picture: NDArray, one: NDArray, two: NDArray, side: int = SIDE) -> Ve
     deviation = np.sqrt(_sums(half**2, side)) / counts[..., None]
     floor = 0.01 * truth.mean() + 1e-12
     relative = np.abs(found - mean) / (mean + floor)
-    chance = CHANCE * deviation / (mean + floor)
+    chance = CHANCE * np.sqrt(1 + own) * deviation / (mean + floor)
     # a square's own estimate of its noise is unsure: those around have as much
     chance = np.maximum(chance, np.median(chance, axis=(0, 1)))
     beyond = np.maximum(relative - chance, 0).max(axis=-1)
@@ -58,7 +64,7 @@ def verify(picture: NDArray, one: NDArray, two: NDArray, side: int = SIDE) -> Ve
     off = np.repeat(np.repeat(beyond, side, 0), side, 1)[:h, :w].astype(np.float32)
     # of a normal noise the mean size is sqrt(2 / pi) of its deviation
     noise = float((deviation / (mean + floor)).mean() * np.sqrt(2 / np.pi))
-    return Verdict(float(relative.mean()), noise, float((beyond > 0.01).mean()), off)
+    return Verdict(float(relative.mean()), noise, float((beyond > TELLING).mean()), off)
 
 
 def _sums(image: NDArray, side: int) -> NDArray[np.float64]:

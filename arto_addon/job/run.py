@@ -25,6 +25,7 @@ from ...core.errors import ArtoError, CancelledError, SceneError
 from ..capture.capture import capture
 from ..capture.sequence import capture_frames
 from ..fit import fit
+from ..relight.composite import save_composite
 from ..relight.looks import relight_looks
 from ..relight.many import frames_of, relight_many
 from ..relight.relight import compute
@@ -95,6 +96,7 @@ def _steps(task: Task, folder: Path) -> Any:
         "shoot": shoot,
         "relight_looks": relight_looks,
         "verify": verify_plate,
+        "composite": save_composite,
     }[task.verb]
     return work(scene, task.view_layer)
 

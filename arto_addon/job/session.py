@@ -39,6 +39,7 @@ DOING = {
     "shoot": "capturing",
     "relight_looks": "relighting the looks of",
     "verify": "verifying the plate of",
+    "composite": "compositing",
 }
 LOG = "log.txt"
 
@@ -68,7 +69,9 @@ class Job:
         self.blend = bpy.data.filepath
         self.light = scene.arto.look.strip()
         _remove_leftovers(claimed)
-        if not verb.startswith(("relight", "verify")) and (holder := Lock.holder(claimed)):
+        if not verb.startswith(("relight", "verify", "composite")) and (
+            holder := Lock.holder(claimed)
+        ):
             raise BusyError(
                 f"{claimed} is in use: {holder}; wait until it is done, or end it there"
             )

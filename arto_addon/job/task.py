@@ -18,7 +18,7 @@ TASK = "task.json"
 PROGRESS = "progress.json"
 VERBS = (
     "capture", "fit", "relight", "capture_frames", "relight_frames", "shoot", "relight_looks",
-    "verify",
+    "verify", "composite",
 )  # fmt: skip
 
 

@@ -51,7 +51,10 @@ def _last_render(scene: bpy.types.Scene) -> NDArray[np.float32]:
             try:
                 result.save_render(str(path), scene=settings)
             except RuntimeError as e:
-                raise SceneError("nothing was rendered yet: press F12 once, then Compare") from e
+                raise SceneError(
+                    "there is no render to compare with: set Use in Compositor to In a Viewer, "
+                    f"press F12, then Compare ({e})"
+                ) from e
             return next(iter(exr.read(path).values()))
     finally:
         bpy.data.scenes.remove(settings)

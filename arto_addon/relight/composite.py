@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...core.errors import SceneError
 from ..blender.compositing import OUTPUT, composited, compositor, own_compositor
 from ..shot import paths
+from ..work import Progress, Steps
 
 COMPOSITE = "ARTO Composite"
 
@@ -22,10 +23,11 @@ def composite_file(scene: bpy.types.Scene) -> Path:
     return plate.with_name(f"{plate.stem}_composite{scene.render.file_extension}")
 
 
-def save_composite(scene: bpy.types.Scene) -> Path:
-    """Write what the scene's compositor puts out -> the file.
+def save_composite(scene: bpy.types.Scene, view_layer: str) -> Steps:
+    """Write what the scene's compositor puts out; returns (the file).
 
-    Raises SceneError where it has none, or shows a render: only files are at hand here.
+    It is for a job: in a Blender of its own the artist's last render stays what it is. Raises
+    SceneError where the scene has no compositor, or shows a render: only files are at hand here.
     """
     tree = compositor(scene)
     if tree is None:
@@ -36,6 +38,7 @@ def save_composite(scene: bpy.types.Scene) -> Path:
             "in Compositor to Instead of the Render, or press F12"
         )
     path = composite_file(scene)
+    yield Progress(0.1, "compositing")
     picture = _composited(scene)
     height, width = picture.shape[:2]
     image = bpy.data.images.new(COMPOSITE, width, height, alpha=True, float_buffer=True)
@@ -48,7 +51,8 @@ def save_composite(scene: bpy.types.Scene) -> Path:
         raise SceneError(f"{path} cannot be written ({e})") from e
     finally:
         bpy.data.images.remove(image)
-    return path
+    yield Progress(1.0, f"wrote {path}")
+    return (path,)
 
 
 def _composited(scene: bpy.types.Scene) -> NDArray[np.float32]:

@@ -35,6 +35,12 @@ _WORDS = {
 }  # fmt: skip
 
 
+_PLACES = {
+    "top": "at the top", "bottom": "below", "left": "on the left", "right": "on the right",
+    "back": "at the back", "front": "in front",
+}  # fmt: skip
+
+
 @dataclass(frozen=True)
 class Seen:
     """What a look inside found: sentences, and the unfolded hemicube, (h, w, 4)."""
@@ -85,9 +91,8 @@ def look(scene: bpy.types.Scene, x: int, y: int) -> Seen:
     if parts:
         best = parts[0]
         share = float(best.light.sum()) / came if came else 0.0
-        lines.append(
-            f"{len(parts)} patches; most from {field.hemicube.patch_name(best.patch)}: {share:.0%}"
-        )
+        face = field.hemicube.grid[best.patch][0]
+        lines.append(f"The brightest of {len(parts)} patches, {_PLACES[face]}, gives {share:.0%}")
     return Seen(tuple(lines), drawn(field.hemicube, environment, parts, SIDE))
 
 
@@ -137,7 +142,8 @@ def light_from(scene: bpy.types.Scene, direction: NDArray) -> tuple[NDArray[np.f
     some = relight(shown.field, PatchLight(part_of(environment, share), hemicube), 0.0)
     every = relight(shown.field, PatchLight(environment, hemicube), 0.0)
     whole = float(every[..., :3].sum(dtype=np.float64))
-    part = float(some[..., :3].sum(dtype=np.float64)) / whole if whole else 0.0
+    # a plane laid through a bright spot undershoots beside it
     some[..., :3] = np.maximum(some[..., :3], 0)
+    part = float(some[..., :3].sum(dtype=np.float64)) / whole if whole else 0.0
     place = f"azimuth {math.degrees(azimuth):.0f}°, elevation {math.degrees(elevation):.0f}°"
     return some, f"{part:.1%} of the picture's light comes from there ({place})"

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...core import exr
 from ...core.errors import SceneError
+from ...core.field import Field
 from ...core.verify import Verdict, marked, verify
 from ..shot import paths
 from ..shot.shot import layer_of
@@ -60,7 +61,9 @@ def verify_plate(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps
     if renders[0].shape[:2] != there.shape[:2]:
         raise SceneError("the plate has another size than a render now: press Relight first")
     yield Progress(0.95, "comparing")
-    found = verify(there[..., :3], renders[0][..., :3], renders[1][..., :3])
+    samples = Field(paths.field_folder(scene, layer)).about.get("samples") or SAMPLES
+    ratio = 2 * SAMPLES / samples
+    found = verify(there[..., :3], renders[0][..., :3], renders[1][..., :3], own=ratio)
     told = {"verify": said(scene, found), "samples": f"2 x {SAMPLES}"}
     out = verify_file(path)
     plate.write(scene, out, marked(there, found), told)

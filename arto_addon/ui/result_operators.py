@@ -7,7 +7,6 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import SceneError
-from ..live import live
 from ..relight import compare
 from ..relight.composite import save_composite
 from ..relight.plate import name_of, show
@@ -80,24 +79,20 @@ differs from them by more than their noise"""
         return verify_plate(scene, view_layer)
 
 
-class ARTO_OT_save_composite(Quick):
+class ARTO_OT_save_composite(LongWork):
     """Save what the scene's compositor makes of the relit picture, in the scene's output format, \
 without rendering"""
 
     bl_idname = "arto.save_composite"
     bl_label = "Save Composite"
+    verb = "composite"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if bpy.app.is_job_running("RENDER"):
-            cls.poll_message_set("Blender is rendering: wait until it is done")
-            return False
         return free(cls) and _has_plate(cls, context)
 
-    def work(self, context: bpy.types.Context) -> str:
-        if live.current is not None:
-            live.put_away(live.current.name)
-        return f"wrote {save_composite(context.scene)}"
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
+        return save_composite(scene, view_layer)
 
 
 CLASSES = (

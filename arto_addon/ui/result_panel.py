@@ -93,7 +93,9 @@ class Result(Draws):
         row.operator("arto.relight", icon="WORLD")
         if session.current is None:
             shot_panel.ended(
-                column, context, ("relight", "relight_frames", "relight_looks", "verify")
+                column,
+                context,
+                ("relight", "relight_frames", "relight_looks", "verify", "composite"),
             )
         if not text:
             if status.field_line(scene) is None:

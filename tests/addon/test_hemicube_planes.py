@@ -94,10 +94,10 @@ def test_build_and_remove(scene):
     assert not any(o.visible_camera for o in collection.objects)
     hemicube, radius = planes.built(scene)
     assert hemicube.size == pytest.approx(1000 * radius)
-    # the corners of the planes are those of the patches
+    # the corners of the planes are in the directions of the patches, where they can be seen
     plane = collection.objects[5]
     corners = np.array([v.co for v in plane.data.vertices])
-    expected = np.array(hemicube.centre) + hemicube.size * hemicube.corners(5)
+    expected = np.array(hemicube.centre) + planes.VISIBLE * radius * hemicube.corners(5)
     np.testing.assert_allclose(corners, expected, rtol=1e-5)
     # built again it is still one
     bpy.ops.arto.build_hemicube()
