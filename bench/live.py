@@ -101,7 +101,7 @@ class _Hand:
             self.tick()
             if self.live.trouble:
                 raise RuntimeError(self.live.trouble)
-            if self.live._wished[-1:] == (True,) and self.live.viewer.idle:
+            if self.live.settled:
                 return
             if time.perf_counter() > until:
                 raise RuntimeError(f"live came to no rest: {self.live.line}")

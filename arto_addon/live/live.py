@@ -140,14 +140,18 @@ class Live:
             gains = gains_of(scene.arto)
             view = None if scene.render.film_transparent else view_of(scene, self.shape)
             self.viewer.wish(Wish(image, strength, turn, own, gains, resting, view))
-        if resting and rest > FINISHED and scene.arto.live_finish:
+        if rest > FINISHED and self.settled and scene.arto.live_finish:
             self._finish(scene)
+
+    @property
+    def settled(self) -> bool:
+        """Whether the whole picture of what the world is now is shown."""
+        wished = self._wished
+        return wished[:-2] == self._now and wished[-1:] == (True,) and self.viewer.idle
 
     def _finish(self, scene: bpy.types.Scene) -> None:
         """Start the relight that finishes what is shown, once."""
         if self._finished == self._now or session.current or bpy.app.is_job_running("RENDER"):
-            return
-        if not self.viewer.idle:
             return
         self._finished, self.relighting = self._now, True
         session.start("relight", scene, self.layer)

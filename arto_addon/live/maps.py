@@ -69,6 +69,7 @@ class Maps:
         self.newest: tuple[str, NDArray[np.float32]] | None = None
         self._lock = threading.Lock()
         self.trouble = ""
+        self._number = 0
         self._failed: set[tuple[str, bool]] = set()
 
     def start(self) -> None:
@@ -113,7 +114,9 @@ class Maps:
             self.start()
         process = self._process
         assert process and process.stdin
-        blend = self._folder / "world.blend"
+        # another name each time: a Blender that has read a library knows it
+        self._number += 1
+        blend = self._folder / f"world{self._number}.blend"
         painted = {}
         # images are named by whole paths: the file lies elsewhere
         bpy.data.libraries.write(str(blend), {world}, path_remap="ABSOLUTE", fake_user=True)
@@ -229,6 +232,7 @@ def _made(asked: Asked) -> str:
         np.save(asked.out, found.image)
     finally:
         bpy.data.worlds.remove(world)
+        Path(asked.blend).unlink(missing_ok=True)
         bpy.data.orphans_purge(do_recursive=True)
     return asked.out
 

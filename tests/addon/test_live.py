@@ -1,0 +1,236 @@
+"""Live: what is seen is the plate, turns need no map, and the newest wish wins."""
+
+from __future__ import annotations
+
+import time
+from itertools import pairwise
+
+import bpy
+import numpy as np
+import pytest
+from arto.arto_addon import fit, shoot, work
+from arto.arto_addon.live import live, maps
+from arto.arto_addon.live.viewer import Viewer, Wish
+from arto.arto_addon.relight.light_key import HEADER, light_key
+from arto.arto_addon.relight.relight import compute
+from arto.arto_addon.shot import paths
+from arto.arto_addon.world import kept
+from arto.arto_addon.world.dials import without_dials
+from arto.core import exr
+from arto.core.errors import ArtoError
+from scene_tools import captured, set_colour, small_scene
+
+
+def _hdri(scene) -> None:
+    image = bpy.data.images.new("Sky", 64, 32, float_buffer=True)
+    rng = np.random.default_rng(0)
+    pixels = np.ones((32, 64, 4), np.float32)
+    pixels[..., :3] = rng.uniform(0.1, 2, (32, 64, 3))
+    image.pixels.foreach_set(pixels.ravel())
+    image.update()
+    image.pack()
+    tree = scene.world.node_tree
+    texture = tree.nodes.new("ShaderNodeTexEnvironment")
+    texture.image = image
+    tree.links.new(texture.outputs[0], tree.nodes["Background"].inputs["Color"])
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    scene = small_scene(tmp_path_factory.mktemp("live"), lamp=True)
+    scene.render.film_transparent = True
+    scene.arto.environment_width, scene.arto.live_finish = 128, False
+    scene.arto.samples, scene.arto.support = 16, "auto"
+    _hdri(scene)
+    captured(scene)
+    work.run(fit.fit(scene))
+    return scene
+
+
+@pytest.fixture
+def on(scene):
+    found = live.Live(scene)
+    yield found
+    found.close()
+    live.put_away(found.name)
+
+
+def _rest(on: live.Live) -> np.ndarray:
+    """Tick until the whole picture is shown -> it, top-down."""
+    until = time.monotonic() + 60
+    while True:
+        on.dirty = True
+        assert on.tick()
+        assert not on.trouble, on.trouble
+        assert time.monotonic() < until, on.line
+        if on.settled:
+            break
+        time.sleep(0.02)
+    image = bpy.data.images[live.IMAGE]
+    pixels = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(pixels)
+    return pixels.reshape(image.size[1], image.size[0], 4)[::-1]
+
+
+def test_what_is_seen_is_the_plate(scene, on) -> None:
+    """To 1e-3 of the picture's light, before denoising; the scene's lamps too."""
+    seen = _rest(on)
+    work.run(compute(scene, scene.view_layers[0].name))
+    plate = next(iter(exr.read(paths.relit_file(scene)).values()))
+    assert np.abs(seen - plate).max() < 1e-3 * plate[..., :3].mean()
+    # and after a turn, a strength and less of the scene's lamps
+    scene.world.arto.rotation, scene.world.arto.strength = 1.1, 0.6
+    scene.arto.own_lamps = 0.5
+    try:
+        seen = _rest(on)
+        work.run(compute(scene, scene.view_layers[0].name))
+        plate = next(iter(exr.read(paths.relit_file(scene)).values()))
+        assert np.abs(seen - plate).max() < 1e-3 * plate[..., :3].mean()
+    finally:
+        scene.world.arto.rotation, scene.world.arto.strength = 0.0, 1.0
+        scene.arto.own_lamps = 1.0
+
+
+def test_turns_and_strengths_ask_for_no_map(scene, on, monkeypatch) -> None:
+    scene.world.arto.rotation = 0.2  # puts its node in, which is another world
+    _rest(on)
+    asked = []
+    monkeypatch.setattr(on.maps, "ask", lambda *a: asked.append(a))
+    shown = [_rest(on)]
+    for turn, strength in ((0.9, 1.0), (2.0, 0.5), (-1.0, 2.0)):
+        scene.world.arto.rotation, scene.world.arto.strength = turn, strength
+        shown.append(_rest(on))
+    assert not asked
+    assert all((a != b).any() for a, b in pairwise(shown))
+    scene.world.arto.rotation, scene.world.arto.strength = 0.2, 1.0
+
+
+def test_any_node_is_followed(scene, on) -> None:
+    """A tint of the world multiplies what is seen, but for the scene's own lamps."""
+    scene.arto.own_lamps = 0.0
+    try:
+        before = _rest(on)
+        scene.world.arto.tint = (1.0, 0.25, 0.5)
+        after = _rest(on)
+        scale = np.array((1.0, 0.25, 0.5))
+        lit = before[..., :3] > 0.02
+        ratio = after[..., :3] / np.maximum(before[..., :3] * scale, 1e-6)
+        assert np.abs(ratio[lit] - 1).max() < 0.02
+    finally:
+        scene.world.arto.tint, scene.arto.own_lamps = (1, 1, 1), 1.0
+
+
+def test_a_world_that_cannot_light_is_said(scene, on) -> None:
+    texture = next(
+        n for n in scene.world.node_tree.nodes if n.bl_idname == "ShaderNodeTexEnvironment"
+    )
+    image, texture.image = texture.image, None
+    try:
+        with pytest.raises(ArtoError, match="no image"):
+            _rest(on)
+    finally:
+        texture.image = image
+
+
+def test_the_newest_wish_wins(on) -> None:
+    """Of a thousand wishes at once few are begun, and the last one is shown."""
+    image = np.ones((64, 128, 3), np.float32)
+    viewer = Viewer(on.viewer.preview)
+    try:
+        for i in range(1000):
+            viewer.wish(Wish(image, 1 + i, 0.0, 0.0, {}, resting=True))
+        until = time.monotonic() + 20
+        last = None
+        while time.monotonic() < until:
+            last = viewer.take() or last
+            if last and last.wish.strength == 1000:
+                break
+            time.sleep(0.01)
+        assert last and last.wish.strength == 1000
+        assert viewer.made < 200
+        # light is linear
+        viewer.wish(Wish(image, 1.0, 0.0, 0.0, {}, resting=True))
+        while (one := viewer.take()) is None:
+            time.sleep(0.01)
+        np.testing.assert_allclose(last.picture[..., :3], 1000 * one.picture[..., :3], rtol=1e-3)
+    finally:
+        viewer.close()
+
+
+def test_a_map_that_is_on_its_way_is_shown_though_the_hand_moved_on(scene, on) -> None:
+    """Else a hand that never rests would see nothing."""
+    _rest(on)
+    made = on.viewer.made
+    until = time.monotonic() + 15
+    i = 0
+    while time.monotonic() < until and on.viewer.made < made + 3:
+        i += 1
+        scene.world.arto.tint = (1.0, 0.3 + 0.001 * i, 0.5)
+        on.dirty = True
+        on.tick()
+        time.sleep(0.02)
+    scene.world.arto.tint = (1, 1, 1)
+    assert on.viewer.made >= made + 3
+
+
+def test_nothing_is_left(scene) -> None:
+    before = {i.name for i in bpy.data.images}
+    found = live.Live(scene)
+    _rest(found)
+    folder, process = found.maps._folder, found.maps._process
+    found.close()
+    live.put_away(found.name)
+    assert not folder.exists() and process.poll() is not None
+    assert {i.name for i in bpy.data.images} == before
+
+
+def test_maps_are_those_of_a_relight(scene) -> None:
+    """What the other Blender makes is what this one makes, whole."""
+    made = maps.Maps()
+    try:
+        key = kept.shows(scene, scene.world)[0]
+        made.ask(scene, scene.view_layers[0].name, scene.world, key, True)
+        until = time.monotonic() + 60
+        while made.get(key, True) is None:
+            assert not made.trouble, made.trouble
+            assert time.monotonic() < until
+            time.sleep(0.05)
+        with without_dials(scene.world) as (plain, _, _):
+            expected = kept.environment(scene, 128, None, plain).image
+        np.testing.assert_array_equal(made.get(key, True), expected)
+    finally:
+        made.close()
+
+
+def test_without_a_capture_it_says_so(tmp_path) -> None:
+    scene = small_scene(tmp_path)
+    with pytest.raises(ArtoError, match="no reflectance field"):
+        live.Live(scene)
+
+
+def test_one_button(tmp_path) -> None:
+    """Capture, fit and relight in one: the plate is that of the three by themselves, the shares of
+    the work only rise, and its key says that it is of this light."""
+    scene = small_scene(tmp_path)
+    scene.arto.keep, scene.arto.support, scene.arto.samples = "never", "auto", 16
+    scene.arto.grain, scene.arto.patterns = False, "linear"
+    set_colour(scene, (0.5, 0.4, 0.3))
+    shares = []
+    (path,) = work.run(shoot.shoot(scene), lambda step: shares.append(step.share))
+    assert path == paths.relit_file(scene) and path.is_file()
+    assert shares == sorted(shares) and shares[-1] == 1.0
+    assert exr.header(path)[HEADER] == light_key(scene, scene.world)
+    one = next(iter(exr.read(path).values()))
+    work.run(compute(scene, scene.view_layers[0].name))
+    np.testing.assert_array_equal(next(iter(exr.read(path).values())), one)
+    scene.world.arto.strength = 2.0
+    assert exr.header(path)[HEADER] != light_key(scene, scene.world)
+
+
+def test_one_button_without_a_world(tmp_path) -> None:
+    scene = small_scene(tmp_path)
+    scene.arto.samples, scene.world = 4, None
+    texts = []
+    assert work.run(shoot.shoot(scene), lambda s: texts.append(s.text)) == (None,)
+    assert "add a world" in texts[-1]
+    assert (paths.field_folder(scene) / "field.json").is_file()
