@@ -6,6 +6,7 @@ group of Blender's compositor with a gain and a tint for each.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +26,7 @@ from ..work import Progress, Steps
 from ..world import kept
 from ..world.lamp_render import lamp_light, lamp_samples
 from . import denoise
-from .plate import layers_file
+from .plate import full_file, layers_file, window_of
 
 if TYPE_CHECKING:
     from .relight import Ready, Shown
@@ -154,7 +155,11 @@ def write(
     named = {
         f"{settings.layer_prefix}{layer_name(n)}": p for n, p in zip(names, stored, strict=True)
     }
-    exr.write_layered(layers_file(path), picture, named, attributes, space)
+    window, file = window_of(scene), layers_file(path)
+    exr.write_layered(file, picture, named, attributes, space, window)
+    if window.crop:
+        full = replace(window, crop=False)
+        exr.write_layered(full_file(file), picture, named, attributes, space, full)
     yield Progress(0.95, f"layers: {', '.join(named)}; their sum is off by {off:.1e} at most")
 
 

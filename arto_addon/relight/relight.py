@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +12,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.catcher import Caught, catch
+from ...core.catcher import catch
 from ...core.environment import Environment
 from ...core.errors import FieldError
 from ...core.field import Field
@@ -31,7 +30,7 @@ from ..world import kept
 from ..world.background import background, background_with_holes, holds_out
 from ..world.check import check_world, differs_by_rays
 from ..world.lamp_render import brightness, lamp_light, lamp_samples, region_of
-from . import denoise, layers, plate
+from . import denoise, files, plate
 from .footage import footage
 from .present import present
 
@@ -218,7 +217,9 @@ def make_ready(shown: Shown, lit: Light) -> Steps:
     if changed:
         # allowed: it is the artist who knows whether it shows
         yield Progress(0.0, f"the scene is not the captured one: {'; '.join(changed[:3])}")
-    shown.filmed()  # what cannot be read is said before the long work
+    # what cannot be read or written is said before the long work
+    plate.window_of(scene).check(field.shape)
+    shown.filmed()
     yield Progress(0.0, "bringing the world to an environment map")
     if by_rays := differs_by_rays(world):
         yield Progress(0.0, f"the world is {by_rays}")
@@ -272,37 +273,8 @@ def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> S
         yield Progress(0.8, "adding the world behind")
         _behind(shown, lit, picture, ready.found.share > LEAST_SHARE)
         lap("background")
-    yield Progress(0.9, f"writing {path}")
     about = {"scene": scene.name, "world": ready.world.name, "denoised": denoised}
-    about["lamps"] = ready.lamps
-    if scene.render.film_transparent and scene.cycles.film_transparent_glass:
-        glass = "opaque: what is seen through it is in it, whatever Transparent Glass says"
-        about["glass"] = glass
-        yield Progress(0.9, f"glass: {glass}")
-    about |= {
-        "look": lit.look,
-        "turn": f"{math.degrees(ready.whole.turn):.4g}" if ready.whole.turn else "",
-        "world by rays": ready.by_rays,
-        "changed since capture": "; ".join(ready.changed),
-    }
-    about = {name: text for name, text in about.items() if text}
-    if caught:
-        about[plate.CATCHER.removeprefix("arto.")] = "footage * catcher + RGB"
-    if settings.layers != "OFF":
-        about[plate.LAYERS.removeprefix("arto.")] = plate.layers_file(path).name
-    plate.write(scene, path, picture, about)
-    if caught:
-        plate.write(scene, plate.share_file(path), caught.share, about)
-        if settings.shadows == "ADD":
-            plate.write(scene, plate.light_file(path), caught.light, about)
-        yield from _into_footage(shown, caught, path, about)
-    if settings.write_data:
-        plate.write_data(scene, path, shown.field, about)
-    if settings.layers != "OFF":
-        found = yield from layers.of_plate(shown, ready)
-        if not scene.render.film_transparent:
-            found[layers.BEHIND] = picture[..., :3] - things
-        yield from layers.write(scene, path, picture, found, *plate.header_of(scene, about))
+    yield from files.write(shown, ready, files.Made(picture, things, caught), about)
     lap("write")
     say = f" (denoised: {denoised})" if settings.denoise else ""
     yield Progress(1.0, f"wrote {path}{say}")
@@ -324,20 +296,6 @@ def _with_own(
 def _denoised(shown: Shown, parts: list[NDArray]) -> list[NDArray]:
     clean = denoise.clean(shown.field)
     return [denoise.denoise(shown.guides, *parts, clean=clean, like=shown.scene)]
-
-
-def _into_footage(
-    shown: Shown, caught: Caught, path: Path, about: dict[str, str]
-) -> Iterator[Progress]:
-    """Write the things in the artist's footage, where there is some."""
-    found = shown.filmed()
-    if found is None:
-        return
-    name, there = found
-    yield Progress(0.9, f"putting it into the footage: {name}")
-    adds = shown.scene.arto.shadows == "ADD"
-    comp = caught.added_to(there) if adds else caught.over(there)
-    plate.write(shown.scene, plate.comp_file(path), comp, about | {"footage": name})
 
 
 def _lamps(shown: Shown, found: Split) -> Steps:

@@ -84,6 +84,8 @@ class ARTO_PT_layers(Panel, bpy.types.Panel):
         column.prop(settings, "write_data")
         if settings.write_data:
             column.prop(settings, "cryptomatte")
+        column.prop(settings, "data_window")
+        column.prop(settings, "overscan")
         column.prop(settings, "footage")
         column.prop(settings, "shadows")
         column.prop(settings, "use_in_compositor")

@@ -176,6 +176,29 @@ class RelightSettings:
         description="Write the layers as 16-bit floats, as compositing does; else as 32-bit",
         default=True,
     )
+    data_window: EnumProperty(
+        name="Data Window",
+        description="Which pixels the files have",
+        items=[
+            ("FULL", "All", "All of the picture"),
+            (
+                "CROP",
+                "Cropped",
+                "Only those around what is there: other programs work faster on them. Blender's "
+                "own nodes show copies that are whole",
+            ),
+        ],
+        default="FULL",
+    )
+    overscan: IntProperty(
+        name="Overscan",
+        description="How many pixels at each edge the scene's resolution has beyond what is "
+        "delivered. The files keep them, outside of their display window",
+        subtype="PIXEL",
+        min=0,
+        soft_max=500,
+        default=0,
+    )
     output: StringProperty(
         name="Relit Picture",
         description="The relit EXR; empty: beside the .blend, named after it",
