@@ -51,7 +51,10 @@ def write(shown: Shown, ready: Ready, made: Made, about: dict[str, str]) -> Step
     if caught:
         about[plate.CATCHER.removeprefix("arto.")] = "footage * catcher + RGB"
     if settings.layers != "OFF":
-        about[plate.LAYERS.removeprefix("arto.")] = plate.layers_file(path).name
+        name = plate.layers_file(path).name
+        if settings.layers_files == "EACH":
+            name = f"{path.stem}_{settings.layer_prefix}*.exr"
+        about[plate.LAYERS.removeprefix("arto.")] = name
     if plate.window_of(scene).crop:
         about[plate.CROPPED.removeprefix("arto.")] = plate.full_file(path).name
     plate.write(scene, path, picture, about, shows=True)

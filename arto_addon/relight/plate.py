@@ -85,6 +85,11 @@ def layers_file(path: Path) -> Path:
     return path.with_name(f"{path.stem}_layers.exr")
 
 
+def world_file(path: Path) -> Path:
+    """Beside a plate: the world that a mix of its layers is rendered with."""
+    return path.with_name(f"{path.stem}_world.exr")
+
+
 def data_file(path: Path) -> Path:
     """Beside a plate: what a denoiser or a compositor knows a picture by."""
     return path.with_name(f"{path.stem}_data.exr")

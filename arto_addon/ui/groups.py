@@ -79,6 +79,7 @@ class ARTO_PT_layers(Panel, bpy.types.Panel):
                         column.prop(group, name)
         if settings.layers != "OFF":
             column.prop(settings, "layer_prefix")
+            column.prop(settings, "layers_files")
             column.prop(settings, "layers_half")
             column.operator("arto.mix_to_scene", icon="WORLD_DATA")
         column.prop(settings, "write_data")

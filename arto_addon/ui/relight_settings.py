@@ -171,6 +171,20 @@ class RelightSettings:
         description="What the layers' names begin with in the file",
         default="LG_",
     )
+    layers_files: EnumProperty(
+        name="Layer Files",
+        description="How the layers are written for other programs",
+        items=[
+            ("ONE", "One for All", "One file with all layers and the picture in it"),
+            (
+                "EACH",
+                "One Each",
+                "A file for each layer, named after it, with R, G, B and the picture's alpha. The "
+                "mixer in Blender's compositor keeps a file of all",
+            ),
+        ],
+        default="ONE",
+    )
     layers_half: BoolProperty(
         name="Half Float",
         description="Write the layers as 16-bit floats, as compositing does; else as 32-bit",
