@@ -22,6 +22,8 @@ from .errors import ExrError
 PICTURE = "arto.picture"
 # No display window that makes a picture of more pixels is believed: most of it would be empty.
 _MOST_PIXELS = 1 << 27
+# Cycles' depth where a ray meets nothing.
+NO_HIT = 1e10
 
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1, the last two inside
 Part = tuple[str, dict[str, NDArray]]
@@ -59,7 +61,8 @@ class Window:
         (height, width), n = shape, self.overscan
         y0, y1, x0, x1 = 0, height - 1, 0, width - 1
         if self.crop:
-            y0, y1, x0, x1 = _something([p for _, some in parts for p in some.values()], n)
+            planes = [plane for _, some in parts for plane in some.items()]
+            y0, y1, x0, x1 = _something(planes, n)
         cut = slice(y0, y1 + 1), slice(x0, x1 + 1)
         found = [
             (name, {c: np.ascontiguousarray(plane[cut]) for c, plane in channels.items()})
@@ -75,13 +78,16 @@ class Window:
 FULL = Window()
 
 
-def _something(planes: Sequence[NDArray], overscan: int) -> tuple[int, int, int, int]:
-    """The first and last row and column in which any plane is not 0; of empty ones those of the
-    first pixel that is delivered, as no file is without pixels."""
-    shape = planes[0].shape
+def _something(planes: Sequence[tuple[str, NDArray]], overscan: int) -> tuple[int, int, int, int]:
+    """The first and last row and column in which any plane, by its channel's name, is not 0, and no
+    depth of nothing; of empty ones those of the first pixel that is delivered, as no file is
+    without pixels."""
+    shape = planes[0][1].shape
     rows, columns = np.zeros(shape[0], bool), np.zeros(shape[1], bool)
-    for plane in planes:
+    for name, plane in planes:
         there = plane != 0
+        if name.rpartition(".")[2] == "Z":
+            there &= ~(plane >= NO_HIT)
         rows |= there.any(axis=1)
         columns |= there.any(axis=0)
     if not rows.any():

@@ -63,8 +63,9 @@ def write(shown: Shown, ready: Ready, made: Made, about: dict[str, str]) -> Step
         if settings.shadows == "ADD":
             plate.write(scene, plate.light_file(path), caught.light, about)
         yield from _into_footage(shown, ready, caught, about)
-    if settings.write_data:
-        plate.write_data(scene, path, shown.field, about)
+    if settings.write_data and (missing := plate.write_data(scene, path, shown.field, about)):
+        lacks = f"the data file has no {', '.join(missing)}"
+        yield Progress(0.9, f"{lacks}: it was not captured; capture again to have it")
     if settings.layers != "OFF":
         found = yield from layers.of_plate(shown, ready)
         if not scene.render.film_transparent:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...core import cryptomatte, exr
 from ...core.errors import SceneError
-from ...core.exr_window import Window
+from ...core.exr_window import NO_HIT, Window
 from ...core.field import Field
 from ..shot import home, paths
 from .header import header
@@ -96,19 +96,28 @@ def data_file(path: Path) -> Path:
 
 
 # Of the layers of that file, the letters of their channels.
-DATA = {"albedo": "RGB", "normal": "XYZ", "depth": "Z"}
+DATA = {"albedo": "RGB", "normal": "XYZ", "depth": "Z", "position": "XYZ"}
+# Of its header: what of this there is not.
+MISSING = "arto.missing"
 
 
-def write_data(scene: bpy.types.Scene, path: Path, field: Field, about: dict[str, str]) -> None:
+def write_data(
+    scene: bpy.types.Scene, path: Path, field: Field, about: dict[str, str]
+) -> list[str]:
     """Write what a field knows of a plate beside its light, as 32-bit floats, a part each; and the
-    Cryptomattes of the artist's own render, where the settings name it. Raises SceneError where
-    that is of another size; ExrError."""
+    Cryptomattes of the artist's own render, where the settings name it. Returns what the field does
+    not know. Raises SceneError where the render is of another size; ExrError."""
     parts: dict[str, dict[str, NDArray]] = {}
+    missing = [name for name in DATA if not field.has_layer(name)]
     for name, letters in DATA.items():
         if field.has_layer(name):
             pixels = field.layer(name).reshape(*field.shape, -1)
+            if name == "depth":  # outside a render region
+                pixels = np.where(pixels == 0, np.float32(NO_HIT), pixels)
             parts[name] = {c: pixels[..., i] for i, c in enumerate(letters)}
     attributes, _ = header_of(scene, about)
+    if missing:
+        attributes[MISSING] = ", ".join(missing)
     if scene.arto.cryptomatte:
         rendered = home.absolute(scene.arto.cryptomatte)
         planes, names = cryptomatte.read(rendered)
@@ -118,6 +127,7 @@ def write_data(scene: bpy.types.Scene, path: Path, field: Field, about: dict[str
         attributes |= names
     if parts:
         exr.write_planes(data_file(path), parts, attributes, window_of(scene))
+    return missing
 
 
 def comp_file(path: Path) -> Path:

@@ -108,7 +108,8 @@ class RelightSettings:
     )
     write_data: BoolProperty(
         name="Write Data",
-        description="Write albedo, normals and depth beside the picture, as 32-bit floats",
+        description="Write albedo, normals, depth and positions beside the picture, as 32-bit "
+        "floats",
         default=False,
     )
     cryptomatte: StringProperty(

@@ -183,6 +183,7 @@ def test_a_reader_that_knows_nothing_of_arto(lit):
         "albedo": ("R", "G", "B"),
         "normal": ("X", "Y", "Z"),
         "depth": ("Z",),
+        "position": ("X", "Y", "Z"),
     }
 
 
