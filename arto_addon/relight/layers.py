@@ -135,10 +135,9 @@ def of_plate(shot: Shown, ready: Ready) -> Steps:
         # of no group; what is left of sums by rounding is nothing
         found[OWN] = scale * np.where(left > 1e-5 * shown.own, left, 0)
     if scene.arto.denoise and denoise.available():
-        clean = denoise.clean(field)
         for name, picture in found.items():
             yield Progress(0.93, f"denoising the layer {name}")
-            found[name] = denoise.denoise(shown.guides, picture, clean=clean, like=scene)
+            found[name] = shown.denoised(picture)
     return found
 
 

@@ -129,6 +129,17 @@ class Shown:
     def guides(self) -> dict[str, NDArray]:
         return denoise.guides_of(self.field)
 
+    def denoised(self, *parts: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The sum of pictures of what the field shows, (H, W, 3), each denoised by itself."""
+        clean = denoise.clean(self.field)
+        found = denoise.denoise(self.guides, *parts, clean=clean, like=self.scene)
+        # a denoiser lets outlines glow into what is empty, and footage is seen through that
+        nothing = self.field.layer("alpha") == 0
+        for part in parts:
+            nothing &= ~part.any(axis=-1)
+        found[nothing] = 0
+        return found
+
     @cached_property
     def own(self) -> NDArray[np.float32]:
         return self.field.layer("own")
@@ -251,7 +262,7 @@ def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> S
     if settings.denoise:
         yield Progress(0.7, "denoising")
         if denoise.available():
-            summed = [_denoised(t, parts) for t, parts in zip(shown.takes, summed, strict=True)]
+            summed = [[t.denoised(*parts)] for t, parts in zip(shown.takes, summed, strict=True)]
             denoised = "Open Image Denoise"
         else:
             # said here, in the file's header and in the last line
@@ -291,11 +302,6 @@ def _with_own(
     picture[..., :3] += np.float32(shown.scene.arto.own_lamps) * shown.own
     parts = [*parts, picture[..., :3]]
     return [sum(parts)] if ready.together else parts
-
-
-def _denoised(shown: Shown, parts: list[NDArray]) -> list[NDArray]:
-    clean = denoise.clean(shown.field)
-    return [denoise.denoise(shown.guides, *parts, clean=clean, like=shown.scene)]
 
 
 def _lamps(shown: Shown, found: Split) -> Steps:

@@ -57,9 +57,12 @@ def test_every_file_has_the_windows_and_the_same_pixels(shot):
             data, display = windows(path)
             assert display == (0, 0, 18, 12)
             for name, pixels in layers.items():
-                np.testing.assert_array_equal(pixels, before[path][name])
+                was = before[path][name]
+                # the depth of nothing is nothing, and is cropped
+                was = np.where(was == 1e10, 0, was) if crop and name == "depth" else was
+                np.testing.assert_array_equal(np.where(pixels == 1e10, was, pixels), was)
             # around what is there, of all layers of a file
-            there = np.any([p.any(axis=-1) for p in layers.values()], axis=0)
+            there = np.any([((p != 0) & (p < 1e10)).any(axis=-1) for p in layers.values()], axis=0)
             (rows, columns) = (there.any(axis=i).nonzero()[0] for i in (1, 0))
             if crop:
                 size = int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1
