@@ -25,7 +25,14 @@ from .shot import safe_name
 # After ARTO there may be a number, where a light group of the artist's has the name without.
 GROUP = re.compile(r"(?:^|\.)Combined_ARTO(?:-\d+)?_(\d{4})_(\w+)$")
 # Layers beside the basis images, by the end of their part's name.
-GUIDES = {"albedo": "Denoising Albedo", "normal": "Denoising Normal", "depth": "Depth"}
+GUIDES = {
+    "albedo": "Denoising Albedo",
+    "normal": "Denoising Normal",
+    "depth": "Depth",
+    "position": "Position",
+}
+# Of them those that are of one ray through a pixel, its first: a mean of two is no place at all.
+OF_ONE_RAY = ("depth", "position")
 # The light groups of the scene's own lamps, as their artist named them.
 OWN_GROUP = re.compile(r"(?:^|\.)Combined_(.+)$")
 # The pattern that shows the noise: a patch of grains so fine that no reflection resolves them, half
@@ -52,8 +59,8 @@ def own_layer(group: str) -> str:
 @dataclass(frozen=True)
 class Around:
     """What a tile shows beside its patches. own: (h, w, 3), the light of the scene's own lamps;
-    alpha: (h, w); guides: albedo, normal (h, w, 3), depth (h, w), those that were captured, and of
-    each light group of the scene's own lamps its `own_layer` (h, w, 3)."""
+    alpha: (h, w); guides: albedo, normal, position (h, w, 3), depth (h, w), those that were
+    captured, and of each light group of the scene's own lamps its `own_layer` (h, w, 3)."""
 
     own: NDArray[np.float32]
     alpha: NDArray[np.float32]
@@ -182,7 +189,7 @@ class BasisImages:
             return _mean(total, others)
 
         guides = {
-            n: mean([a.guides[n] for a in layers])
+            n: first.guides[n] if n in OF_ONE_RAY else mean([a.guides[n] for a in layers])
             for n in first.guides
             if all(n in a.guides for a in layers)
         }

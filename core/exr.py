@@ -1,5 +1,8 @@
 """The one door to EXR files. Rows run top-down, as in the file; data is float32 unless it was half.
 
+What is read is the whole picture: all of the display window, and what there is beyond it, with 0
+where the file has no pixels (`exr_window`).
+
 Blender carries an OpenEXR of its own whose symbols the wheel's library would otherwise find first:
 compressed reads then report errors for good pixels. The extension's wheels are changed so that
 they find their own first (tools/wheel_symbols.py). RTLD_DEEPBIND is no way: it also passes by the
@@ -21,6 +24,7 @@ from .errors import ExrError
 from .exr_layout import LayoutError, PlainPart, forget
 from .exr_layout import check as check_layout
 from .exr_layout import plain as plain_parts
+from .exr_window import FULL, Window, place
 from .files import whole
 
 _ORDER = "RGBAXYZ"  # of channels in an array; others follow
@@ -52,6 +56,20 @@ def _parts(path: Path, header_only: bool) -> list[Any]:
     if len(file.parts) != parts:
         raise ExrError(f"{path} has a damaged part: make it again")
     return list(file.parts)
+
+
+def _decoded(path: Path) -> tuple[list[dict[str, Any]], list[dict[str, NDArray]]]:
+    """The header of each part and its channels by name, of the whole picture. Raises ExrError."""
+    heads, channels = [], []
+    for part in _parts(path, header_only=False):
+        heads.append(dict(part.header))
+        channels.append({name: channel.pixels for name, channel in part.channels.items()})
+        part.channels.clear()  # or it would hold what `take` lets go of
+    try:
+        place(heads, channels)
+    except ExrError as e:
+        raise ExrError(f"{path} is damaged, {e}: make it again") from None
+    return heads, channels
 
 
 def _check_complete(path: Path) -> int:
@@ -95,10 +113,7 @@ def _telling(path: Path) -> Iterator[None]:
 
 def whole_parts(path: Path) -> list[tuple[dict[str, Any], dict[str, NDArray]]]:
     """The header and the channels by name of each part of a file. Raises ExrError."""
-    found = []
-    for part in _parts(path, header_only=False):
-        found.append((dict(part.header), {n: c.pixels for n, c in part.channels.items()}))
-    return found
+    return list(zip(*_decoded(path), strict=True))
 
 
 def part_names(path: Path) -> list[str]:
@@ -140,13 +155,13 @@ class Layers:
         self.path = path
         self._data, plain = _mapped(path)
         self._plain: list[PlainPart] = plain or []
-        self._decoded: list[Any] = []
+        self._decoded: list[dict[str, NDArray]] = []
         heads: list[tuple[dict[str, Any], Iterable[str]]]
         if self._plain:
             heads = [({"name": p.name}, [c for c, _ in p.channels]) for p in self._plain]
         else:
-            self._decoded = _parts(path, header_only=False)
-            heads = [(p.header, list(p.channels)) for p in self._decoded]
+            found, self._decoded = _decoded(path)
+            heads = [(head, list(p)) for head, p in zip(found, self._decoded, strict=True)]
         self._layers = _layers(path, heads)
 
     def __enter__(self) -> Layers:
@@ -185,7 +200,7 @@ class Layers:
         if self._decoded:
             part, channels = self._layers[name]
             for channel in channels:
-                del self._decoded[part].channels[channel]
+                del self._decoded[part][channel]
         return self._filled(name, planes)
 
     def let_go(self, name: str) -> None:
@@ -198,7 +213,7 @@ class Layers:
         """The channels of a layer, each (H, W), where they lie: not to be kept or written to."""
         part, channels = self._layers[name]
         if not self._plain:
-            return [self._decoded[part].channels[channel].pixels for channel in channels]
+            return [self._decoded[part][channel] for channel in channels]
         there = self._plain[part]
         found, at = {}, there.offset
         for channel, kind in there.channels:
@@ -266,18 +281,22 @@ def write(
     layers: dict[str, NDArray],
     attributes: dict[str, Any] | None = None,
     colour_space: str = "Linear Rec.709",
+    window: Window = FULL,
 ) -> None:
     """Write layers, (H, W, 3), (H, W, 4) or (H, W), each as a part of its own; ZIP, as they are.
 
     A single layer named '' makes an ordinary one-part image. The file appears whole or not at all.
-    Raises ExrError if the folder cannot be written or the disk is full.
+    Raises ExrError if the folder cannot be written or the disk is full, or of the window.
     """
     parts = [(name, _channels(pixels)) for name, pixels in layers.items()]
-    _write(path, parts, attributes, colour_space)
+    _write(path, parts, attributes, colour_space, window)
 
 
 def write_planes(
-    path: Path, parts: dict[str, dict[str, NDArray]], attributes: dict[str, Any]
+    path: Path,
+    parts: dict[str, dict[str, NDArray]],
+    attributes: dict[str, Any],
+    window: Window = FULL,
 ) -> None:
     """Write data, planes (H, W) by the names of their channels in parts of theirs, as 32-bit
     floats. Raises ExrError as `write`."""
@@ -285,7 +304,7 @@ def write_planes(
         part: {name: np.ascontiguousarray(p, np.float32) for name, p in channels.items()}
         for part, channels in parts.items()
     }
-    _write(path, list(planes.items()), attributes, "Non-Color")
+    _write(path, list(planes.items()), attributes, "Non-Color", window)
 
 
 def write_layered(
@@ -294,6 +313,7 @@ def write_layered(
     layers: dict[str, NDArray],
     attributes: dict[str, Any] | None = None,
     colour_space: str = "Linear Rec.709",
+    window: Window = FULL,
 ) -> None:
     """Write a picture (H, W, 4) and layers of it, (H, W, 3) each, into one part: the picture as
     plain R, G, B, A, the layers as `name.R` and so on, as compositing programs look for them.
@@ -303,7 +323,7 @@ def write_layered(
     channels = _channels(beauty)
     for name, pixels in layers.items():
         channels |= {f"{name}.{c}": plane for c, plane in _channels(pixels).items()}
-    _write(path, [("", channels)], attributes, colour_space)
+    _write(path, [("", channels)], attributes, colour_space, window)
 
 
 def _channels(pixels: NDArray) -> dict[str, NDArray]:
@@ -321,12 +341,16 @@ def _write(
     parts: list[tuple[str, dict[str, NDArray]]],
     attributes: dict[str, Any] | None,
     colour_space: str,
+    window: Window,
 ) -> None:
     exr = _openexr()
     head = {"compression": exr.ZIP_COMPRESSION, "type": exr.scanlineimage}
     if colour_space in COLOUR_SPACES:
         head["colorInteropID"] = COLOUR_SPACES[colour_space]
     head["colorSpace"] = colour_space
+    if window != FULL:
+        parts, windows = window.put(parts)
+        head |= windows
     made = [exr.Part({**head, **(attributes or {})}, channels, name) for name, channels in parts]
     try:
         with whole(path) as partial:

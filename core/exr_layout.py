@@ -15,6 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .exr_window import PICTURE
+
 # No name in a header is longer, and no picture larger.
 _LONGEST_TEXT = 256
 _LARGEST = 1 << 17
@@ -48,6 +50,8 @@ class _Part:
     sampled: bool
     tiles: tuple[int, int, int] | None
     chunks: int
+    # whether its data window is all of the picture
+    whole: bool
 
 
 @dataclass(frozen=True)
@@ -72,13 +76,13 @@ def check(data: mmap.mmap | bytes) -> int:
 
 
 def plain(data: mmap.mmap | bytes) -> list[PlainPart] | None:
-    """The parts of a file whose pixels may be read where they lie; None where any is packed, tiled
-    or out of order. Raises LayoutError for a file that is not whole."""
+    """The parts of a file whose pixels may be read where they lie; None where any is packed, tiled,
+    out of order, or not all of the picture. Raises LayoutError for a file that is not whole."""
     parts, tables, leader = _checked(data)
     found = []
     for part, table in zip(parts, tables, strict=True):
         stride = leader + 4 + part.width * part.pixel_bytes
-        apart = part.compression != _NONE or part.tiles or part.sampled
+        apart = part.compression != _NONE or part.tiles or part.sampled or not part.whole
         if apart or (np.diff(table.astype(np.int64)) != stride).any():
             return None
         if any(kind == _UINT for _, kind in part.channels):
@@ -197,7 +201,12 @@ def _part(attributes: dict[bytes, bytes], multipart: bool, tiled: bool) -> _Part
     if chunks is None or chunks < 1 or (multipart and said_chunks not in (None, chunks)):
         raise LayoutError("its number of chunks is not that of its pixels")
     name = attributes.get(b"name", b"").rstrip(b"\0").decode("utf-8", "replace")
-    return _Part(name, width, height, compression, channels, pixel_bytes, sampled, tiles, chunks)
+    # of what has no display window the library says that itself
+    whole = attributes.get(b"displayWindow") in (None, attributes[b"dataWindow"])
+    whole &= PICTURE.encode() not in attributes
+    return _Part(
+        name, width, height, compression, channels, pixel_bytes, sampled, tiles, chunks, whole
+    )
 
 
 def _channels(data: bytes) -> tuple[tuple[tuple[str, int], ...], bool]:

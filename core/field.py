@@ -27,7 +27,7 @@ _ABOUT: dict[str, type | tuple[type, ...]] = {
     "samples": (int, float), "far": bool, "separate": bool, "guides": str, "proxy": int,
     "catchers": list, "take": str, "pair": str,
 }  # fmt: skip
-LAYERS = ("own", "alpha", "albedo", "normal", "depth")
+LAYERS = ("own", "alpha", "albedo", "normal", "depth", "position")
 
 
 def proxy_folder(folder: Path, factor: int) -> Path:

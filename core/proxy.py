@@ -72,7 +72,9 @@ class _Grid:
 def _halved(tile: TileWriter, hemicube: Hemicube) -> TileWriter:
     grid = _Grid(tile.region)
     shape = tile.region.height, tile.region.width
-    half = TileWriter(grid.half, {name: grid.mean(p) for name, p in tile.layers.items()})
+    # a mean of places is none
+    layers = {name: grid.mean(p) for name, p in tile.layers.items() if name != "position"}
+    half = TileWriter(grid.half, layers)
     of: dict[int, list[tuple[int, NDArray, NDArray, NDArray]]] = {}
     for code, patches in tile.models.items():
         for k, pixels, coefficient, parameters in patches:

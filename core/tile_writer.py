@@ -8,6 +8,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from .basis_images import OF_ONE_RAY
 from .errors import FieldError
 from .field_tile import FULL, LARGEST, blocks_of, steps_of
 from .files import whole
@@ -155,6 +156,7 @@ def _halves(values: NDArray, unit: float) -> NDArray[np.float16]:
 
 def write_layer(folder: Path, name: str, pixels: NDArray) -> None:
     """Write one of `field.LAYERS` of a tile into its folder, whole or not at all."""
-    dtype = np.float32 if name == "depth" or name.startswith("own") else np.float16
+    exact = name in OF_ONE_RAY or name.startswith("own")
+    dtype = np.float32 if exact else np.float16
     with whole(folder / f"{name}.npy") as partial, partial.open("wb") as f:
         np.save(f, pixels.astype(dtype))

@@ -84,6 +84,8 @@ def asked(
         grain = settings.grain and settings.route == "all"
         patterns = pattern_set(settings.patterns)
         prepare(on, layers=len(patterns) + grain)
+        # one of hundreds of passes; the takes beside the first hand on nothing but light
+        on.scene.view_layers[0].use_pass_position = name == WHOLE
         if name == THINGS:
             only_things(on.scene.view_layers[0])
         shot = shot_of(scene, view_layer, region)

@@ -26,9 +26,9 @@ ON_DISK = 12
 PER_PASS = 44
 PER_PATCH = 10
 FITTED = 4500
-OTHER_PASSES = 8
+OTHER_PASSES = 9
 # Of a field on disk, with its layers and proxies: of a pixel, and of each patch in it, about.
-FIELD, FIELD_PATCH = 62, 2.0
+FIELD, FIELD_PATCH = 74, 2.0
 # Of what is needed, how much more must be free.
 SPARE = 0.05
 

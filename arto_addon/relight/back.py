@@ -20,7 +20,7 @@ from ..world import kept
 from ..world.check import check_world
 from . import layers
 from .mixer import EXPOSURE_SOCKET, SOURCE
-from .plate import layers_file
+from .plate import layers_file, shown_file, world_file
 from .relight import Shown
 
 WORLD = "ARTO Mix"
@@ -72,7 +72,8 @@ def mix_to_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> Path:
     mix, settings = mix_of(scene), scene.arto
     shown = Shown(scene, layer)
     world = check_world(scene, layer)
-    lit = exr.header(layers_file(paths.relit_file(scene))).get("arto.world")
+    path = paths.relit_file(scene)
+    lit = exr.header(shown_file(layers_file(path), exr.header(path))).get("arto.world")
     if lit != world.name:
         raise SceneError(
             f"the layers are of the world '{lit}', and the scene has '{world.name}': relight first"
@@ -87,8 +88,7 @@ def mix_to_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> Path:
         left -= share
     # light from where no patch is: seen, though it lights nothing
     image += whole.image * np.maximum(left, 0)[..., None] * np.float32(2.0**mix.exposure)
-    path = paths.relit_file(scene)
-    path = path.with_name(f"{path.stem}_world.exr")
+    path = world_file(path)
     exr.write(path, {"": image}, None, bpy.data.colorspace.working_space)
     _gain_lamps(scene, mix)
     scene.world = _world_of(path, whole.turn)

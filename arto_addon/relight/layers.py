@@ -1,11 +1,12 @@
 """Layers of a plate: what each part of the world's light, its lamps and the scene's own give to it.
 
-They are written beside the plate, in one file that compositing programs open, and stand in a node
-group of Blender's compositor with a gain and a tint for each.
+They are written beside the plate, in one file that compositing programs open or in one each, and
+stand in a node group of Blender's compositor with a gain and a tint for each.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,12 +22,23 @@ from ...core.layers import REST, by_faces, disc, part_of, residual, share_out, s
 from ...core.light import PatchLight
 from ...core.relight import relights, together
 from ...core.shot import safe_name
+from ..shot import paths
 from ..work import Progress, Steps
 from ..world import kept
 from ..world.lamp_render import lamp_light, lamp_samples
 from . import denoise
 from .own import gains_of
-from .plate import layers_file
+from .plate import (
+    comp_file,
+    data_file,
+    full_file,
+    layers_file,
+    light_file,
+    share_file,
+    shown_file,
+    window_of,
+    world_file,
+)
 
 if TYPE_CHECKING:
     from .relight import Ready, Shown
@@ -127,10 +139,9 @@ def of_plate(shot: Shown, ready: Ready) -> Steps:
         # of no group; what is left of sums by rounding is nothing
         found[OWN] = scale * np.where(left > 1e-5 * own, left, 0)
     if scene.arto.denoise and denoise.available():
-        clean = denoise.clean(field)
         for name, picture in found.items():
             yield Progress(0.93, f"denoising the layer {name}")
-            found[name] = denoise.denoise(shown.guides, picture, clean=clean, like=scene)
+            found[name] = shown.denoised(picture)
     return found
 
 
@@ -142,9 +153,12 @@ def write(
     attributes: dict[str, Any],
     space: str,
 ) -> Steps:
-    """Write layers that sum to a plate (H, W, 4), and it; says how far their sum is off."""
+    """Write layers that sum to a plate (H, W, 4), and it; says how far their sum is off. Raises
+    SceneError, ExrError."""
     settings = scene.arto
-    names = list(layers)
+    names = [f"{settings.layer_prefix}{layer_name(name)}" for name in layers]
+    each = settings.layers_files == "EACH"
+    files = layer_files(path, names) if each else {}
     parts = share_out(list(layers.values()), beauty[..., :3])
     kind = np.float32
     if settings.layers_half:
@@ -155,11 +169,40 @@ def write(
     stored = [part.astype(kind) for part in parts]
     picture = beauty.astype(kind)
     off = residual(stored, picture[..., :3].astype(np.float64))
-    named = {
-        f"{settings.layer_prefix}{layer_name(n)}": p for n, p in zip(names, stored, strict=True)
-    }
-    exr.write_layered(layers_file(path), picture, named, attributes, space)
+    named = dict(zip(names, stored, strict=True))
+    window = window_of(scene)
+    for name, file in files.items():
+        one = np.dstack([named[name], picture[..., 3]])
+        exr.write(file, {"": one}, attributes | {"arto.layer": name}, space, window)
+    together = layers_file(path)
+    if not each:
+        exr.write_layered(together, picture, named, attributes, space, window)
+    # the mixer shows all of them from one file, and all of their pixels
+    whole = shown_file(together, attributes)
+    if window.crop if not each else path == paths.relit_file(scene):
+        full = replace(window, crop=False)
+        exr.write_layered(whole, picture, named, attributes, space, full)
     yield Progress(0.95, f"layers: {', '.join(named)}; their sum is off by {off:.1e} at most")
+
+
+def layer_files(path: Path, names: list[str]) -> dict[str, Path]:
+    """Where layers of these names are, beside a plate, if each is a file. Raises SceneError where
+    one would be written over another file."""
+    beside = (share_file, light_file, layers_file, data_file, comp_file, world_file)
+    others = [path, *(name(path) for name in beside)]
+    taken = {file.name.lower() for one in others for file in (one, full_file(one))}
+    found = {}
+    for name in names:
+        file = path.with_name(f"{path.stem}_{safe_name(name)}.exr")
+        # most disks do not tell large letters from small ones
+        if file.name.lower() in taken:
+            raise SceneError(
+                f"the layer '{name}' would be written over another file, {file.name}: rename its "
+                "group, or change Layer Prefix"
+            )
+        taken.add(file.name.lower())
+        found[name] = file
+    return found
 
 
 def layer_name(name: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from ...core import cryptomatte, exr
 from ...core.errors import SceneError
+from ...core.exr_window import NO_HIT, Window
 from ...core.field import Field
 from ..shot import home, paths
 from .header import header
@@ -20,16 +22,46 @@ IMAGE = "ARTO Relit"
 SOURCE = "ARTO Relit"
 # And that of how much a plate with shadow catchers shows of what is behind.
 SHARE = "ARTO Catcher"
-# Of such a plate's header, and of one that has layers.
-CATCHER, LAYERS = "arto.shadow catchers", "arto.layers"
+# Of such a plate's header, of one that has layers, of one that is cropped: its copy that is not.
+CATCHER, LAYERS, CROPPED = "arto.shadow catchers", "arto.layers", "arto.full window"
 
 
 def write(
-    scene: bpy.types.Scene, path: Path, picture: NDArray[np.float32], about: dict[str, str]
+    scene: bpy.types.Scene,
+    path: Path,
+    picture: NDArray[np.float32],
+    about: dict[str, str],
+    shows: bool = False,
 ) -> None:
     """Write the plate: (H, W, 4) scene-linear, premultiplied. The header names its colour space,
-    and has what Blender's own render of the scene would have in it."""
-    exr.write(path, {"": picture}, *header_of(scene, about))
+    and has what Blender's own render of the scene would have in it.
+
+    shows: whether a node group of ours does: then it is there with all its pixels, too.
+    """
+    window = window_of(scene)
+    exr.write(path, {"": picture}, *header_of(scene, about), window)
+    if window.crop and shows:
+        full = replace(window, crop=False)
+        exr.write(full_file(path), {"": picture}, *header_of(scene, about), full)
+
+
+def window_of(scene: bpy.types.Scene) -> Window:
+    """How the settings want pictures to stand in their files."""
+    return Window(scene.arto.overscan, scene.arto.data_window == "CROP")
+
+
+def full_file(path: Path) -> Path:
+    """Beside a file that is cropped: the same with all its pixels.
+
+    Blender's image is the data window, wherever that stands, and its compositor puts one that is
+    not in the middle of its display window upside down: as far below as it should be above (5.2).
+    """
+    return path.with_name(f"{path.stem}_full.exr")
+
+
+def shown_file(path: Path, header: dict[str, Any]) -> Path:
+    """What Blender shows of a file of a plate that has this header."""
+    return full_file(path) if CROPPED in header else path
 
 
 def header_of(scene: bpy.types.Scene, about: dict[str, str]) -> tuple[dict[str, Any], str]:
@@ -53,25 +85,39 @@ def layers_file(path: Path) -> Path:
     return path.with_name(f"{path.stem}_layers.exr")
 
 
+def world_file(path: Path) -> Path:
+    """Beside a plate: the world that a mix of its layers is rendered with."""
+    return path.with_name(f"{path.stem}_world.exr")
+
+
 def data_file(path: Path) -> Path:
     """Beside a plate: what a denoiser or a compositor knows a picture by."""
     return path.with_name(f"{path.stem}_data.exr")
 
 
 # Of the layers of that file, the letters of their channels.
-DATA = {"albedo": "RGB", "normal": "XYZ", "depth": "Z"}
+DATA = {"albedo": "RGB", "normal": "XYZ", "depth": "Z", "position": "XYZ"}
+# Of its header: what of this there is not.
+MISSING = "arto.missing"
 
 
-def write_data(scene: bpy.types.Scene, path: Path, field: Field, about: dict[str, str]) -> None:
+def write_data(
+    scene: bpy.types.Scene, path: Path, field: Field, about: dict[str, str]
+) -> list[str]:
     """Write what a field knows of a plate beside its light, as 32-bit floats, a part each; and the
-    Cryptomattes of the artist's own render, where the settings name it. Raises SceneError where
-    that is of another size; ExrError."""
+    Cryptomattes of the artist's own render, where the settings name it. Returns what the field does
+    not know. Raises SceneError where the render is of another size; ExrError."""
     parts: dict[str, dict[str, NDArray]] = {}
+    missing = [name for name in DATA if not field.has_layer(name)]
     for name, letters in DATA.items():
         if field.has_layer(name):
             pixels = field.layer(name).reshape(*field.shape, -1)
+            if name == "depth":  # outside a render region
+                pixels = np.where(pixels == 0, np.float32(NO_HIT), pixels)
             parts[name] = {c: pixels[..., i] for i, c in enumerate(letters)}
     attributes, _ = header_of(scene, about)
+    if missing:
+        attributes[MISSING] = ", ".join(missing)
     if scene.arto.cryptomatte:
         rendered = home.absolute(scene.arto.cryptomatte)
         planes, names = cryptomatte.read(rendered)
@@ -80,7 +126,8 @@ def write_data(scene: bpy.types.Scene, path: Path, field: Field, about: dict[str
         parts["cryptomatte"] = planes
         attributes |= names
     if parts:
-        exr.write_planes(data_file(path), parts, attributes)
+        exr.write_planes(data_file(path), parts, attributes, window_of(scene))
+    return missing
 
 
 def comp_file(path: Path) -> Path:

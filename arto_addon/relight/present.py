@@ -12,7 +12,17 @@ import bpy
 from ...core import exr
 from ..shot.shot import layer_of
 from .mixer import mixer
-from .plate import CATCHER, LAYERS, SOURCE, layers_file, name_of, node_group, share_file, show
+from .plate import (
+    CATCHER,
+    LAYERS,
+    SOURCE,
+    layers_file,
+    name_of,
+    node_group,
+    share_file,
+    show,
+    shown_file,
+)
 
 # What the name of a plate's mixer has after the plate's.
 MIX = " Mix"
@@ -27,10 +37,12 @@ def present(scene: bpy.types.Scene, path: Path, look: str | None = None) -> bpy.
     be undone.
     """
     name = name_of(scene, look)
-    image, header = show(path, name), exr.header(path)
-    share = show(share_file(path), f"{name} Catcher") if CATCHER in header else None
+    header = exr.header(path)
+    image, share = show(shown_file(path, header), name), None
+    if CATCHER in header:
+        share = show(shown_file(share_file(path), header), f"{name} Catcher")
     if LAYERS in header:
-        wire(scene, mixer(layers_file(path), name + MIX, share))
+        wire(scene, mixer(shown_file(layers_file(path), header), name + MIX, share))
     node = wire(scene, node_group(image, name, share))
     if node is not None:
         use(scene)
@@ -51,7 +63,7 @@ def present_frames(
     first: the first frame's file. They stand beside the plate of a single frame.
     """
     name = f"{name_of(scene, look)} Frames"
-    image = show(first, name)
+    image = show(shown_file(first, exr.header(first)), name)
     image.source = "SEQUENCE"
     group = node_group(image, name)
     if source := group.nodes.get(SOURCE):

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +12,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.catcher import Caught, catch
+from ...core.catcher import catch
 from ...core.environment import Environment
 from ...core.errors import FieldError
 from ...core.field import Field
@@ -31,7 +30,7 @@ from ..world import kept
 from ..world.background import background, background_with_holes, holds_out
 from ..world.check import check_world, differs_by_rays
 from ..world.lamp_render import brightness, lamp_light, lamp_samples, region_of
-from . import denoise, layers, light_key, plate
+from . import denoise, files, light_key, plate
 from .footage import footage
 from .own import own_of
 from .present import present
@@ -131,6 +130,17 @@ class Shown:
     def guides(self) -> dict[str, NDArray]:
         return denoise.guides_of(self.field)
 
+    def denoised(self, *parts: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The sum of pictures of what the field shows, (H, W, 3), each denoised by itself."""
+        clean = denoise.clean(self.field)
+        found = denoise.denoise(self.guides, *parts, clean=clean, like=self.scene)
+        # a denoiser lets outlines glow into what is empty, and footage is seen through that
+        nothing = self.field.layer("alpha") == 0
+        for part in parts:
+            nothing &= ~part.any(axis=-1)
+        found[nothing] = 0
+        return found
+
 
 def relight(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     """Relight the scene's field with its world and show it: `compute`, then `present.present`.
@@ -215,7 +225,9 @@ def make_ready(shown: Shown, lit: Light) -> Steps:
     if changed:
         # allowed: it is the artist who knows whether it shows
         yield Progress(0.0, f"the scene is not the captured one: {'; '.join(changed[:3])}")
-    shown.filmed()  # what cannot be read is said before the long work
+    # what cannot be read or written is said before the long work
+    plate.window_of(scene).check(field.shape)
+    shown.filmed()
     yield Progress(0.0, "bringing the world to an environment map")
     if by_rays := differs_by_rays(world):
         yield Progress(0.0, f"the world is {by_rays}")
@@ -247,7 +259,7 @@ def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> S
     if settings.denoise:
         yield Progress(0.7, "denoising")
         if denoise.available():
-            summed = [_denoised(t, parts) for t, parts in zip(shown.takes, summed, strict=True)]
+            summed = [[t.denoised(*parts)] for t, parts in zip(shown.takes, summed, strict=True)]
             denoised = "Open Image Denoise"
         else:
             # said here, in the file's header and in the last line
@@ -269,38 +281,9 @@ def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> S
         yield Progress(0.8, "adding the world behind")
         _behind(shown, lit, picture, ready.found.share > LEAST_SHARE)
         lap("background")
-    yield Progress(0.9, f"writing {path}")
     about = {"scene": scene.name, "world": ready.world.name, "denoised": denoised}
-    about["lamps"] = ready.lamps
     about[light_key.HEADER.removeprefix("arto.")] = light_key.light_key(scene, ready.world)
-    if scene.render.film_transparent and scene.cycles.film_transparent_glass:
-        glass = "opaque: what is seen through it is in it, whatever Transparent Glass says"
-        about["glass"] = glass
-        yield Progress(0.9, f"glass: {glass}")
-    about |= {
-        "look": lit.look,
-        "turn": f"{math.degrees(ready.whole.turn):.4g}" if ready.whole.turn else "",
-        "world by rays": ready.by_rays,
-        "changed since capture": "; ".join(ready.changed),
-    }
-    about = {name: text for name, text in about.items() if text}
-    if caught:
-        about[plate.CATCHER.removeprefix("arto.")] = "footage * catcher + RGB"
-    if settings.layers != "OFF":
-        about[plate.LAYERS.removeprefix("arto.")] = plate.layers_file(path).name
-    plate.write(scene, path, picture, about)
-    if caught:
-        plate.write(scene, plate.share_file(path), caught.share, about)
-        if settings.shadows == "ADD":
-            plate.write(scene, plate.light_file(path), caught.light, about)
-        yield from _into_footage(shown, caught, path, about)
-    if settings.write_data:
-        plate.write_data(scene, path, shown.field, about)
-    if settings.layers != "OFF":
-        found = yield from layers.of_plate(shown, ready)
-        if not scene.render.film_transparent:
-            found[layers.BEHIND] = picture[..., :3] - things
-        yield from layers.write(scene, path, picture, found, *plate.header_of(scene, about))
+    yield from files.write(shown, ready, files.Made(picture, things, caught), about)
     lap("write")
     say = f" (denoised: {denoised})" if settings.denoise else ""
     yield Progress(1.0, f"wrote {path}{say}")
@@ -317,25 +300,6 @@ def _with_own(
     picture[..., :3] += own_of(shown.scene, shown.field)
     parts = [*parts, picture[..., :3]]
     return [sum(parts)] if ready.together else parts
-
-
-def _denoised(shown: Shown, parts: list[NDArray]) -> list[NDArray]:
-    clean = denoise.clean(shown.field)
-    return [denoise.denoise(shown.guides, *parts, clean=clean, like=shown.scene)]
-
-
-def _into_footage(
-    shown: Shown, caught: Caught, path: Path, about: dict[str, str]
-) -> Iterator[Progress]:
-    """Write the things in the artist's footage, where there is some."""
-    found = shown.filmed()
-    if found is None:
-        return
-    name, there = found
-    yield Progress(0.9, f"putting it into the footage: {name}")
-    adds = shown.scene.arto.shadows == "ADD"
-    comp = caught.added_to(there) if adds else caught.over(there)
-    plate.write(shown.scene, plate.comp_file(path), comp, about | {"footage": name})
 
 
 def _lamps(shown: Shown, found: Split) -> Steps:

@@ -69,6 +69,7 @@ class Layers(Draws):
                         column.prop(group, name)
         if settings.layers != "OFF":
             column.prop(settings, "layer_prefix", text="Prefix")
+            column.prop(settings, "layers_files", text="")
             column.prop(settings, "layers_half")
             column.operator("arto.mix_to_scene", icon="WORLD_DATA")
         say(column, context, "Footage")
@@ -77,6 +78,8 @@ class Layers(Draws):
         column.prop(settings, "write_data")
         if settings.write_data:
             column.prop(settings, "cryptomatte", text="")
+        column.prop(settings, "data_window", text="")
+        column.prop(settings, "overscan")
 
 
 class Storage(Draws):

@@ -31,7 +31,8 @@ CAPTURE = (
 FIT = ("support", "separate")
 RELIGHT = (
     "own_lamps", "lamps", "lamp_samples", "denoise", "environment_width", "look", "output",
-    "layers", "layer_prefix", "layers_half", "write_data", "cryptomatte", "shadows",
+    "layers", "layer_prefix", "layers_files", "layers_half", "write_data", "cryptomatte", "shadows",
+    "data_window", "overscan",
 )  # fmt: skip
 
 CLASSES = (ArtoGroup, ArtoLook, ArtoLamps, ArtoSettings)

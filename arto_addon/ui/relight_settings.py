@@ -139,7 +139,8 @@ class RelightSettings:
     )
     write_data: BoolProperty(
         name="Write Data",
-        description="Write albedo, normals and depth beside the picture, as 32-bit floats",
+        description="Write albedo, normals, depth and positions beside the picture, as 32-bit "
+        "floats",
         default=False,
     )
     cryptomatte: StringProperty(
@@ -235,10 +236,47 @@ class RelightSettings:
         description="What the layers' names begin with in the file",
         default="LG_",
     )
+    layers_files: EnumProperty(
+        name="Layer Files",
+        description="How the layers are written for other programs",
+        items=[
+            ("ONE", "One for All", "One file with all layers and the picture in it"),
+            (
+                "EACH",
+                "One Each",
+                "A file for each layer, named after it, with R, G, B and the picture's alpha. The "
+                "mixer in Blender's compositor keeps a file of all",
+            ),
+        ],
+        default="ONE",
+    )
     layers_half: BoolProperty(
         name="Half Float",
         description="Write the layers as 16-bit floats, as compositing does; else as 32-bit",
         default=True,
+    )
+    data_window: EnumProperty(
+        name="Data Window",
+        description="Which pixels the files have",
+        items=[
+            ("FULL", "All", "All of the picture"),
+            (
+                "CROP",
+                "Cropped",
+                "Only those around what is there: other programs work faster on them. Blender's "
+                "own nodes show copies that are whole",
+            ),
+        ],
+        default="FULL",
+    )
+    overscan: IntProperty(
+        name="Overscan",
+        description="How many pixels at each edge the scene's resolution has beyond what is "
+        "delivered. The files keep them, outside of their display window",
+        subtype="PIXEL",
+        min=0,
+        soft_max=500,
+        default=0,
     )
     output: StringProperty(
         name="Relit Picture",

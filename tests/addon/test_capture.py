@@ -76,7 +76,7 @@ def test_guides_and_description(tmp_path):
     scene = small_scene(tmp_path)
     there = captured(scene)
     data = there.read(0)
-    assert set(data.guides) == {"albedo", "normal", "depth"}
+    assert set(data.guides) == {"albedo", "normal", "depth", "position"}
     assert data.guides["albedo"].shape == (HEIGHT, WIDTH, 3)
     assert data.alpha.max() == 1
     assert there.head["changed"]["cycles.sample_clamp_indirect"] == [10.0, 0.0]

@@ -11,6 +11,7 @@ import pytest
 from arto.arto_addon import work
 from arto.arto_addon.relight import plate, relight
 from arto.arto_addon.relight.back import mix_to_scene
+from arto.arto_addon.relight.many import relight_many
 from arto.arto_addon.shot import paths
 from arto.core import cryptomatte, exr
 from arto.core.errors import ExrError, SceneError
@@ -182,6 +183,7 @@ def test_a_reader_that_knows_nothing_of_arto(lit):
         "albedo": ("R", "G", "B"),
         "normal": ("X", "Y", "Z"),
         "depth": ("Z",),
+        "position": ("X", "Y", "Z"),
     }
 
 
@@ -296,6 +298,57 @@ def test_a_mix_goes_back_to_the_scene(tmp_path):
     scene.compositing_node_group.links.new(link.outputs[0], node.inputs["LG_key"])
     with pytest.raises(SceneError, match="linked"):
         mix_to_scene(scene)
+
+
+@pytest.mark.parametrize("window", ["FULL", "CROP"])
+def test_a_file_for_each_layer(lit, tmp_path, window):
+    """Another reader finds bare R, G, B, A, which add up to the plate; the mixer goes on."""
+    _, expected = relit(lit)
+    path = paths.relit_file(lit)
+    plate.layers_file(path).unlink()
+    lit.arto.layers_files, lit.arto.data_window = "EACH", window
+    work.run(relight.relight(lit))
+    picture = exr.read(path)[""]
+    total = 0
+    for name, layer in expected.items():
+        file = path.with_name(f"{path.stem}_{name}.exr")
+        image = OpenImageIO.ImageBuf(str(file))
+        assert image.spec().channelnames == ("R", "G", "B", "A")
+        assert image.spec()["arto.layer"] == name
+        pixels = image.get_pixels("float", OpenImageIO.get_roi_full(image.spec()))
+        np.testing.assert_allclose(pixels[..., :3], layer, rtol=1e-5, atol=1e-6)
+        np.testing.assert_array_equal(pixels[..., 3], picture[..., 3])
+        total = total + pixels[..., :3]
+    np.testing.assert_allclose(total, picture[..., :3], rtol=1e-5, atol=1e-6)
+    assert plate.layers_file(path).is_file() == (window == "FULL")
+    node = in_compositor(lit, bpy.data.node_groups["ARTO Relit Mix"], "Image")
+    node.inputs["LG_top"].default_value = 0.25
+    mixed = picture[..., :3] - 0.75 * expected["LG_top"]
+    np.testing.assert_allclose(composited(lit, tmp_path)[..., :3], mixed, rtol=1e-4, atol=1e-5)
+    # many pictures are shown by no mixer, and have no file for it
+    made = work.run(relight_many(lit, lit.view_layers[0].name, turns=2))
+    for each in made:
+        assert each.with_name(f"{each.stem}_LG_top.exr").is_file()
+        assert not plate.layers_file(each).exists()
+        assert not plate.full_file(plate.layers_file(each)).exists()
+
+
+def test_a_mix_of_single_files_goes_back_to_the_scene(lit):
+    lit.arto.layers_files, lit.arto.data_window = "EACH", "CROP"
+    work.run(relight.relight(lit))
+    assert mix_to_scene(lit) == plate.world_file(paths.relit_file(lit))
+
+
+def test_a_layers_file_is_no_other_file(lit):
+    """Not one of ARTO's, and not one that a disk takes for the same."""
+    lit.arto.layers, lit.arto.layers_files, lit.arto.layer_prefix = "GROUPS", "EACH", ""
+    group_at(lit, "Data", 0, 0.5, 0.3)
+    with pytest.raises(SceneError, match=r"'Data' would be written over .*_Data\.exr"):
+        work.run(relight.relight(lit))
+    lit.arto.layer_prefix = "LG_"
+    group_at(lit, "data", 1, 0.5, 0.3)
+    with pytest.raises(SceneError, match="'LG_data' would be written over"):
+        work.run(relight.relight(lit))
 
 
 def relit_alpha(scene):

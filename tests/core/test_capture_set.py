@@ -99,6 +99,26 @@ def test_guides_keep_their_shape(tmp_path: Path, scene, write_scene, shape) -> N
     np.testing.assert_array_equal(guides["depth"], depth)
 
 
+def test_places_of_two_seeds_are_not_mixed(tmp_path: Path, scene, write_scene) -> None:
+    """Albedos are averaged by their samples; a mean of two rays' depths is on neither's way."""
+    folder = write_scene(tmp_path / "c", scene(CUBE))
+    rng = np.random.default_rng(0)
+    albedo, position = rng.random((2, 2, 6, 8, 3), np.float32)
+    depth = np.stack([rng.random((6, 8), np.float32), np.full((6, 8), 1e10, np.float32)])
+    held = exr.read(folder / FILE)
+    for seed in (0, 1):
+        guides = {"Denoising Albedo": albedo[seed], "Depth": depth[seed]}
+        exr.write(folder / f"{seed}.exr", held | guides | {"Position": position[seed]})
+    (tile,) = json.loads((folder / HEADER).read_text())["tiles"]
+    tile["files"] = ["0.exr", "1.exr"]
+    tile["seeds"] = [[3, ["0.exr"]], [1, ["1.exr"]]]
+    change_header(folder, tiles=[tile])
+    found = CaptureSet(folder).read(0).guides
+    np.testing.assert_allclose(found["albedo"], 0.75 * albedo[0] + 0.25 * albedo[1], rtol=1e-6)
+    np.testing.assert_array_equal(found["depth"], depth[0])
+    np.testing.assert_array_equal(found["position"], position[0])
+
+
 def test_names_with_a_view_layer_are_understood(folder: Path, scene) -> None:
     """As Blender writes them."""
     held = exr.read(folder / FILE)

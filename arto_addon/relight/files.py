@@ -1,0 +1,88 @@
+"""The files of a relight: which of them the settings ask for, and what stands in their headers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.catcher import Caught
+from ..work import Progress, Steps
+from . import layers, plate
+
+if TYPE_CHECKING:
+    from .relight import Ready, Shown
+
+
+@dataclass(frozen=True)
+class Made:
+    """What a relight has made. picture: (H, W, 4), the plate; things: (H, W, 3), it without the
+    world behind; caught: of a shot with shadow catchers."""
+
+    picture: NDArray[np.float32]
+    things: NDArray[np.float32]
+    caught: Caught | None
+
+
+def write(shown: Shown, ready: Ready, made: Made, about: dict[str, str]) -> Steps:
+    """Write the plate and what the settings want beside it.
+
+    about: what the headers begin with. Raises SceneError, ExrError.
+    """
+    scene, path, picture, caught = shown.scene, ready.lit.path, made.picture, made.caught
+    settings = scene.arto
+    yield Progress(0.9, f"writing {path}")
+    about = about | {"lamps": ready.lamps}
+    if scene.render.film_transparent and scene.cycles.film_transparent_glass:
+        glass = "opaque: what is seen through it is in it, whatever Transparent Glass says"
+        about["glass"] = glass
+        yield Progress(0.9, f"glass: {glass}")
+    about |= {
+        "look": ready.lit.look,
+        "turn": f"{math.degrees(ready.whole.turn):.4g}" if ready.whole.turn else "",
+        "world by rays": ready.by_rays,
+        "changed since capture": "; ".join(ready.changed),
+    }
+    about = {name: text for name, text in about.items() if text}
+    if caught:
+        about[plate.CATCHER.removeprefix("arto.")] = "footage * catcher + RGB"
+    if settings.layers != "OFF":
+        name = plate.layers_file(path).name
+        if settings.layers_files == "EACH":
+            name = f"{path.stem}_{settings.layer_prefix}*.exr"
+        about[plate.LAYERS.removeprefix("arto.")] = name
+    if plate.window_of(scene).crop:
+        about[plate.CROPPED.removeprefix("arto.")] = plate.full_file(path).name
+    plate.write(scene, path, picture, about, shows=True)
+    if caught:
+        plate.write(scene, plate.share_file(path), caught.share, about, shows=True)
+        if settings.shadows == "ADD":
+            plate.write(scene, plate.light_file(path), caught.light, about)
+        yield from _into_footage(shown, ready, caught, about)
+    if settings.write_data and (missing := plate.write_data(scene, path, shown.field, about)):
+        lacks = f"the data file has no {', '.join(missing)}"
+        yield Progress(0.9, f"{lacks}: it was not captured; capture again to have it")
+    if settings.layers != "OFF":
+        found = yield from layers.of_plate(shown, ready)
+        if not scene.render.film_transparent:
+            found[layers.BEHIND] = picture[..., :3] - made.things
+        yield from layers.write(scene, path, picture, found, *plate.header_of(scene, about))
+
+
+def _into_footage(
+    shown: Shown, ready: Ready, caught: Caught, about: dict[str, str]
+) -> Iterator[Progress]:
+    """Write the things in the artist's footage, where there is some."""
+    found = shown.filmed()
+    if found is None:
+        return
+    name, there = found
+    yield Progress(0.9, f"putting it into the footage: {name}")
+    adds = shown.scene.arto.shadows == "ADD"
+    comp = caught.added_to(there) if adds else caught.over(there)
+    path = plate.comp_file(ready.lit.path)
+    plate.write(shown.scene, path, comp, about | {"footage": name})

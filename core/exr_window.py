@@ -1,0 +1,139 @@
+"""Where a picture stands in what is delivered: the display and the data window of an EXR file.
+
+The display window is what is delivered; the data window is what pixels there are. A picture may
+have more at its edges (overscan), for what a lens bends or a shake moves in, and it may be empty
+where nothing stands, which need not be in the file. ARTO's own files also say which pixels the
+picture had, so that what was cut off as empty comes back as it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import ExrError
+
+# An attribute of ours: the box of all of the picture, which overscan puts beyond the display window
+# and a crop beyond the data window.
+PICTURE = "arto.picture"
+# No display window that makes a picture of more pixels is believed: most of it would be empty.
+_MOST_PIXELS = 1 << 27
+# Cycles' depth where a ray meets nothing.
+NO_HIT = 1e10
+
+Box = tuple[int, int, int, int]  # x0, y0, x1, y1, the last two inside
+Part = tuple[str, dict[str, NDArray]]
+
+
+@dataclass(frozen=True)
+class Window:
+    """How pictures stand in their files.
+
+    overscan: pixels at each edge that they have beyond what is delivered; crop: whether only what
+    is not empty is written.
+    """
+
+    overscan: int = 0
+    crop: bool = False
+
+    def check(self, shape: tuple[int, int]) -> None:
+        """Raise ExrError where a picture (H, W) has no such overscan."""
+        height, width = shape
+        if self.overscan < 0:
+            raise ExrError(f"an overscan of {self.overscan} pixels cannot be: 0 is none")
+        if 2 * self.overscan >= min(height, width):
+            raise ExrError(
+                f"an overscan of {self.overscan} pixels at each edge leaves nothing of a picture "
+                f"of {width}x{height}: make the scene's resolution that of the delivery and "
+                f"{2 * self.overscan} more, or the overscan less"
+            )
+
+    def put(self, parts: Sequence[Part]) -> tuple[list[Part], dict[str, Any]]:
+        """Parts of one file, all of a size, as they are written, and what their header says."""
+        shape = next(iter(parts[0][1].values())).shape
+        self.check(shape)
+        if not self.overscan and not self.crop:
+            return list(parts), {}
+        (height, width), n = shape, self.overscan
+        y0, y1, x0, x1 = 0, height - 1, 0, width - 1
+        if self.crop:
+            planes = [plane for _, some in parts for plane in some.items()]
+            y0, y1, x0, x1 = _something(planes, n)
+        cut = slice(y0, y1 + 1), slice(x0, x1 + 1)
+        found = [
+            (name, {c: np.ascontiguousarray(plane[cut]) for c, plane in channels.items()})
+            for name, channels in parts
+        ]
+        return found, {
+            "displayWindow": _written((0, 0, width - 2 * n - 1, height - 2 * n - 1)),
+            "dataWindow": _written((x0 - n, y0 - n, x1 - n, y1 - n)),
+            PICTURE: _written((-n, -n, width - n - 1, height - n - 1)),
+        }
+
+
+FULL = Window()
+
+
+def _something(planes: Sequence[tuple[str, NDArray]], overscan: int) -> tuple[int, int, int, int]:
+    """The first and last row and column in which any plane, by its channel's name, is not 0, and no
+    depth of nothing; of empty ones those of the first pixel that is delivered, as no file is
+    without pixels."""
+    shape = planes[0][1].shape
+    rows, columns = np.zeros(shape[0], bool), np.zeros(shape[1], bool)
+    for name, plane in planes:
+        there = plane != 0
+        if name.rpartition(".")[2] == "Z":
+            there &= ~(plane >= NO_HIT)
+        rows |= there.any(axis=1)
+        columns |= there.any(axis=0)
+    if not rows.any():
+        return overscan, overscan, overscan, overscan
+    (y,), (x,) = rows.nonzero(), columns.nonzero()
+    return int(y[0]), int(y[-1]), int(x[0]), int(x[-1])
+
+
+def _written(box: Box) -> tuple[NDArray, NDArray]:
+    """A box as the library has it."""
+    return np.array(box[:2], np.int32), np.array(box[2:], np.int32)
+
+
+def place(heads: Sequence[dict[str, Any]], parts: Sequence[dict[str, NDArray]]) -> None:
+    """Put the channels of each part of a file into the whole picture, in `parts`: all that is in
+    its display window, and all that is in the data window of any part. 0 where there is nothing.
+
+    Raises ExrError for windows of a damaged header.
+    """
+    data = [_box(head["dataWindow"]) for head in heads]
+    others = [_box(head[PICTURE]) for head in heads if PICTURE in head]
+    whole = _around([*data, *others, *(_box(head["displayWindow"]) for head in heads)])
+    width, height = whole[2] - whole[0] + 1, whole[3] - whole[1] + 1
+    if width * height > _MOST_PIXELS and any(box != whole for box in data):
+        raise ExrError(f"its windows make a picture of {width}x{height} pixels")
+    for box, channels in zip(data, parts, strict=True):
+        if box == whole:
+            continue
+        y, x = box[1] - whole[1], box[0] - whole[0]
+        there = slice(y, y + box[3] - box[1] + 1), slice(x, x + box[2] - box[0] + 1)
+        shape = box[3] - box[1] + 1, box[2] - box[0] + 1
+        for name, pixels in channels.items():
+            if pixels is not None and pixels.shape == shape:
+                out = np.zeros((height, width), pixels.dtype)
+                out[there] = pixels
+                channels[name] = out
+
+
+def _box(found: Any) -> Box:
+    (x0, y0), (x1, y1) = (tuple(int(v) for v in corner) for corner in found)
+    return x0, y0, x1, y1
+
+
+def _around(boxes: Sequence[Box]) -> Box:
+    """What is around boxes; those that are none count for nothing."""
+    some = [b for b in boxes if b[2] >= b[0] and b[3] >= b[1]]
+    x0, y0 = (min(b[i] for b in some) for i in (0, 1))
+    x1, y1 = (max(b[i] for b in some) for i in (2, 3))
+    return x0, y0, x1, y1
