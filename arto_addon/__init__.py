@@ -20,6 +20,7 @@ from .ui import (
     shot_operators,
     switches,
     thumbnails,
+    translations,
     window,
 )
 
@@ -43,6 +44,7 @@ _MODULES = (
     session,
     live,
     thumbnails,
+    translations,
     overlay,
     window,
     cli,

@@ -66,7 +66,8 @@ def verify_plate(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps
     found = verify(there[..., :3], renders[0][..., :3], renders[1][..., :3], own=ratio)
     told = {"verify": said(scene, found), "samples": f"2 x {SAMPLES}"}
     out = verify_file(path)
-    plate.write(scene, out, marked(there, found), told)
+    # whole, whatever the plate's windows are: it is looked at here and nowhere else
+    exr.write(out, {"": marked(there, found)}, *plate.header_of(scene, told))
     yield Progress(1.0, told["verify"])
     return out
 

@@ -68,6 +68,7 @@ def _live(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
     switch = context.window_manager.arto
     row.prop(switch, "live", toggle=True, icon="LIGHT_SUN")
     row.prop(scene.arto, "live_finish", text="", icon="CHECKMARK")
+    row.prop(switch, "overlay", text="", icon="MESH_CUBE")
     if not row.enabled:
         say(column, context, "Capture the shot to see it live", "INFO")
     if live.current is not None:

@@ -8,6 +8,8 @@ from typing import Any
 
 import bpy
 
+from .words import tr
+
 # Space, region, and what the names of panels there end in.
 SIDEBARS = (
     ("VIEW_3D", "UI", "view"),
@@ -86,7 +88,7 @@ def say(
     letters = max(12, int((room - 56 - (22 if icon != "NONE" else 0)) / _LETTER))
     lines = column.column(align=True)
     lines.scale_y = 0.8
-    text = bpy.app.translations.pgettext_iface(text)
+    text = tr(text)
     for i, line in enumerate(_lines(text, letters)):
         first = icon if i == 0 else ("NONE" if icon == "NONE" else "BLANK1")
         lines.label(text=line, icon=first, translate=False)

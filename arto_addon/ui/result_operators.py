@@ -6,10 +6,11 @@ from pathlib import Path
 
 import bpy
 
+from ...core import exr
 from ...core.errors import SceneError
 from ..relight import compare
 from ..relight.composite import save_composite
-from ..relight.plate import name_of, show
+from ..relight.plate import name_of, show, shown_file
 from ..relight.verify import verify_plate
 from ..shot import paths
 from ..work import Steps
@@ -43,7 +44,9 @@ class ARTO_OT_show_plate(Quick):
     def work(self, context: bpy.types.Context) -> str:
         scene = context.scene
         path = paths.relit_file(scene)
-        image = bpy.data.images.get(name_of(scene)) or show(path, name_of(scene))
+        image = bpy.data.images.get(name_of(scene))
+        if image is None:
+            image = show(shown_file(path, exr.header(path)), name_of(scene))
         reveal(image)
         return f"shown is {path.name}"
 

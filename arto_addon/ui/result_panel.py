@@ -17,6 +17,7 @@ from ..shot.shot import layer_of
 from ..world.check import world_of
 from . import shot_panel, thumbnails
 from .places import Draws, say
+from .words import tr
 
 # Seconds for which what was found holds: a panel is drawn with every move of the mouse.
 _HOLDS = 0.4
@@ -56,14 +57,15 @@ def _plate_line(scene: bpy.types.Scene) -> tuple[str, bool]:
     except (ArtoError, OSError):
         return "", False
     look = scene.arto.look.strip()
-    name = f"Look '{look}', " if look else ""
-    text = f"{name}{time.strftime('%H:%M', time.localtime(written))}"
+    text = time.strftime("%H:%M", time.localtime(written))
+    if look:
+        text = tr("Look '{look}', {time}", look=look, time=text)
     field = source / "field" / "field.json"
     if field.is_file() and field.stat().st_mtime > written:
-        return f"{text}, of an earlier capture", False
+        return tr("{plate}, of an earlier capture", plate=text), False
     if world is None or header.get(HEADER) != light_key(scene, world):
-        return f"{text}, the light changed since", False
-    return f"{text}, up to date", True
+        return tr("{plate}, the light changed since", plate=text), False
+    return tr("{plate}, up to date", plate=text), True
 
 
 class Result(Draws):

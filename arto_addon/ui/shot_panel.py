@@ -12,6 +12,7 @@ from ..stage.settings import looks_otherwise, samples_of
 from ..stage.stage import picture_size
 from . import state
 from .places import Draws, say
+from .words import tr
 
 _ICONS = {
     "blocked": "ERROR",
@@ -35,7 +36,13 @@ class Shot(Draws):
         scene = context.scene
         width, height = picture_size(scene)
         camera = scene.camera.name if scene.camera else "no camera"
-        text = f"{camera}, frame {scene.frame_current}, {width} x {height}"
+        text = tr(
+            "{camera}, frame {frame}, {width} x {height}",
+            camera=camera,
+            frame=scene.frame_current,
+            width=width,
+            height=height,
+        )
         say(column, context, text, "CAMERA_DATA")
         found = state.told(scene)
         for i, line in enumerate(found.lines):
@@ -65,7 +72,8 @@ def _buttons(column: bpy.types.UILayout, context: bpy.types.Context, found: stat
     big = column.row(align=True)
     big.scale_y = 1.6
     # what is there already stands back behind what is to be done
-    big.operator("arto.shoot", text=found.button, icon="RENDER_STILL")
+    text = bpy.app.translations.pgettext_iface(found.button, "Operator")
+    big.operator("arto.shoot", text=text, icon="RENDER_STILL", translate=False)
     if "done" in " ".join(found.lines):
         big.operator("arto.discard_unfinished", text="", icon="TRASH")
     if found.kind == "blocked":
@@ -85,8 +93,12 @@ def running(column: bpy.types.UILayout, context: bpy.types.Context, job: Job) ->
     row.scale_y = 1.3
     row.progress(factor=job.state.share, text=f"{job.state.share:.0%}")
     row.operator("arto.cancel", text="", icon="X")
-    left = "" if job.state.left is None else f", {clock(job.state.left)} left"
-    line = "Stopping" if job.told else f"{clock(job.spent)} spent{left}"
+    line = "Stopping"
+    if not job.told and job.state.left is None:
+        line = tr("{spent} spent", spent=clock(job.spent))
+    elif not job.told:
+        left = clock(job.state.left or 0)
+        line = tr("{spent} spent, {left} left", spent=clock(job.spent), left=left)
     say(column, context, line)
 
 
@@ -113,7 +125,7 @@ class Quality(Draws):
         column.prop(settings, "quality", text="Capture")
         if settings.quality == "CUSTOM":
             column.prop(settings, "samples")
-        say(column, context, f"{samples_of(scene)} samples a pixel")
+        say(column, context, tr("{samples} samples a pixel", samples=samples_of(scene)))
         sub = column.column()
         sub.enabled = denoise.known() is not False
         sub.prop(settings, "denoise")

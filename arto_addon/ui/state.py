@@ -19,6 +19,7 @@ from ..shot import paths, status
 from ..shot.shot import layer_of, shot_of
 from ..stage.settings import samples_of
 from ..stage.stage import picture_region
+from .words import tr
 
 # Seconds of a path on one core, until one was measured on this scene.
 _GUESS = 5e-6
@@ -52,14 +53,15 @@ def told(scene: bpy.types.Scene) -> Told:
     except OSError as e:
         return Told("blocked", ("The folder cannot be read:", str(e.strerror)), "Capture")
     if place.owner:
-        return Told("other", (f"Captured for {place.owner}",), "Capture")
+        return Told("other", (tr("Captured for {owner}", owner=place.owner),), "Capture")
     stopped = status.unfinished(place.source)
     field_line = status.field_line(scene, layer)
     capture_line = status.capture_line(scene, layer)
     if field_line is None and capture_line is None:
         return Told("none", ("No capture yet",), "Capture")
     if field_line is None and stopped:
-        return Told("unfinished", (f"{stopped[0]} done,", "continues where it stopped"), "Continue")
+        lines = tr("{tiles} done,", tiles=stopped[0]), "continues where it stopped"
+        return Told("unfinished", lines, "Continue")
     if field_line is None and not (place.source / "capture").exists():
         then = paths.nearest(scene, layer)
         if then is not None:
@@ -67,7 +69,7 @@ def told(scene: bpy.types.Scene) -> Told:
     if field_line is None:
         return Told("unfitted", ("Captured, but not fitted yet",), "Continue")
     text, serves = field_line
-    more = (f"Another capture: {stopped[0]} done",) if stopped else ()
+    more = (tr("Another capture: {tiles} done", tiles=stopped[0]),) if stopped else ()
     if not serves:
         then = _shot(place.source)
         if then is not None and then.difference(shot_of(scene, layer)):
@@ -78,22 +80,24 @@ def told(scene: bpy.types.Scene) -> Told:
     about = status.field_of(place.source)
     when = _when(place.source / "field" / field.HEADER)
     samples = about.about.get("samples", "?") if about else "?"
-    text = f"Ready, captured {when}, {samples} samples"
+    text = tr("Ready, captured {when}, {samples} samples", when=when, samples=samples)
     return Told("ready", (text, *more), "Continue" if more else "Capture Again", True)
 
 
 def _elsewhere(then: Shot, now: Shot) -> str:
     """How another shot of the scene differs from this one, as an artist says it."""
     if then.camera != now.camera:
-        return f"Captured through {then.camera}, the camera is {now.camera}"
+        text = "Captured through {then}, the camera is {now}"
+        return tr(text, then=then.camera, now=now.camera)
     if then.frame != now.frame or (then.subframe or 0) != (now.subframe or 0):
-        return f"Captured at frame {then.frame}, this is frame {now.frame}"
+        text = "Captured at frame {then}, this is frame {now}"
+        return tr(text, then=then.frame, now=now.frame)
     if (then.width, then.height) != (now.width, now.height):
-        return (
-            f"Captured at {then.width} x {then.height}, the picture is {now.width} x {now.height}"
-        )
+        sizes = f"{then.width} x {then.height}", f"{now.width} x {now.height}"
+        return tr("Captured at {then}, the picture is {now}", then=sizes[0], now=sizes[1])
     if then.view_layer != now.view_layer:
-        return f"Captured of the view layer {then.view_layer}, this is {now.view_layer}"
+        text = "Captured of the view layer {then}, this is {now}"
+        return tr(text, then=then.view_layer, now=now.view_layer)
     difference = then.difference(now) or "another shot"
     return "The camera has moved since" if "camera" in difference else f"Captured of {difference}"
 
@@ -130,9 +134,10 @@ def price(scene: bpy.types.Scene, unfinished: bool = False) -> tuple[str, ...]:
         return (str(e),)
     samples = samples_of(scene)
     left, known = _seconds(scene, pixels * samples, unfinished)
-    about = "about" if known else "perhaps"
-    first = f"{about} {clock(left)}, {samples} samples"
-    return first, f"{size(found.disk)} while it runs, keeps {size(found.kept)}"
+    text = "About {time}, {samples} samples" if known else "Perhaps {time}, {samples} samples"
+    first = tr(text, time=clock(left), samples=samples)
+    disk, kept = size(found.disk), size(found.kept)
+    return first, tr("{disk} while it runs, keeps {kept}", disk=disk, kept=kept)
 
 
 def _seconds(scene: bpy.types.Scene, paths_traced: int, unfinished: bool) -> tuple[float, bool]:
