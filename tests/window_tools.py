@@ -136,6 +136,15 @@ class Window:
         self._xdotool("click", "1")
         time.sleep(0.1)
 
+    def hold(self) -> None:
+        """Press the mouse's button, and keep it pressed."""
+        self._xdotool("mousedown", "1")
+        time.sleep(0.1)
+
+    def let_go(self) -> None:
+        self._xdotool("mouseup", "1")
+        time.sleep(0.1)
+
     def key(self, *keys: str) -> None:
         """Press keys, `ctrl+z` for one."""
         for key in keys:

@@ -17,6 +17,9 @@ import numpy as np
 from ...core.errors import SceneError
 from .task import Painted, Task
 
+# Not empty while a snapshot is saved: for who does something before a file of the artist's is.
+taking: list[bool] = []
+
 
 def take(folder: Path, verb: str, scene: bpy.types.Scene, view_layer: str) -> tuple[Path, Path]:
     """Save the snapshot and its task into `folder` -> (.blend, task). Raises SceneError.
@@ -25,6 +28,7 @@ def take(folder: Path, verb: str, scene: bpy.types.Scene, view_layer: str) -> tu
     """
     blend = folder / (Path(bpy.data.filepath).name or "untitled.blend")
     packing = bpy.data.use_autopack
+    taking[:] = [True]
     try:
         bpy.data.use_autopack = False  # packing would change the artist's images
         bpy.ops.wm.save_as_mainfile(
@@ -45,6 +49,7 @@ def take(folder: Path, verb: str, scene: bpy.types.Scene, view_layer: str) -> tu
         ) from e
     finally:
         bpy.data.use_autopack = packing
+        taking.clear()
 
 
 def in_no_file(image: bpy.types.Image) -> bool:

@@ -17,13 +17,15 @@ import numpy as np
 from bpy.app.handlers import persistent
 from numpy.typing import NDArray
 
+from ...core import exr
 from ...core.errors import ArtoError, SceneError
 from ...core.preview import Preview
-from ..job import session
+from ..job import session, snapshot
+from ..relight.light_key import HEADER, light_key
 from ..relight.own import gains_of
 from ..relight.plate import name_of
 from ..relight.relight import Shown
-from ..shot import watch
+from ..shot import paths, watch
 from ..shot.shot import check_same_shot, layer_of
 from ..world.check import check_world, world_of
 from ..world.kept import shows
@@ -55,7 +57,7 @@ class Live:
         self.maps = maps.Maps()
         self.shape = shown.field.shape
         self.trouble = ""
-        self.line = "starting"
+        self.line = "Starting"
         self.dirty = True
         self._looked = 0.0
         self._now: tuple[Any, ...] = ()
@@ -86,7 +88,7 @@ class Live:
         if shown is not None:
             picture = np.repeat(np.repeat(shown.picture, shown.factor, 0), shown.factor, 1)
             push(picture[: self.shape[0], : self.shape[1]], self.name)
-            size = "whole" if shown.factor == 1 else f"1/{shown.factor} of the size"
+            size = "Whole" if shown.factor == 1 else f"1/{shown.factor} of the size"
             self.line = f"{size}, after {shown.latency:.2f} s"
             redraw_pictures()
         self.trouble = self.maps.trouble or self.viewer.trouble
@@ -153,8 +155,21 @@ class Live:
         """Start the relight that finishes what is shown, once."""
         if self._finished == self._now or session.current or bpy.app.is_job_running("RENDER"):
             return
-        self._finished, self.relighting = self._now, True
+        self._finished = self._now
+        if self._is_finished(scene):
+            return
+        self.relighting = True
         session.start("relight", scene, self.layer)
+
+    def _is_finished(self, scene: bpy.types.Scene) -> bool:
+        """Whether the plate on disk is of this light and field already."""
+        try:
+            path = paths.relit_file(scene)
+            world = check_world(scene, self.layer)
+            same = exr.header(path).get(HEADER) == light_key(scene, world)
+            return same and path.stat().st_mtime_ns >= self.written
+        except (ArtoError, OSError):
+            return False
 
     def close(self) -> None:
         self.viewer.close()
@@ -289,7 +304,7 @@ def _stop(*_: object) -> None:
 
 @persistent
 def _before_save(*_: object) -> None:
-    if current is not None:
+    if current is not None and not snapshot.taking:
         put_away(current.name)
         current._wished = ()
 

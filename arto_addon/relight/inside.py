@@ -86,6 +86,8 @@ def look(scene: bpy.types.Scene, x: int, y: int) -> Seen:
     if told:
         lit = [f"{share:.0%} by {_WORDS.get(name, name)}" for name, share in told[:5]]
         lines.append(f"Lit {', '.join(lit)}")
+    elif field.layer("alpha")[y, x] == 0:
+        lines.append("Nothing stands here: what is seen is the world")
     else:
         lines.append("No light comes here")
     if parts:

@@ -69,12 +69,15 @@ def _live(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
     row.prop(switch, "live", toggle=True, icon="LIGHT_SUN")
     row.prop(scene.arto, "live_finish", text="", icon="CHECKMARK")
     row.prop(switch, "overlay", text="", icon="MESH_CUBE")
-    if not row.enabled:
-        say(column, context, "Capture the shot to see it live", "INFO")
+    # always a line, so that nothing below it jumps
     if live.current is not None:
-        say(column, context, live.current.trouble or f"Live: {live.current.line}")
+        say(column, context, live.current.trouble or live.current.line)
     elif live.trouble:
         say(column, context, live.trouble[0].upper() + live.trouble[1:], "ERROR")
+    elif there:
+        say(column, context, "Follows the world while you change it")
+    else:
+        say(column, context, "Capture the shot to see it live", "INFO")
     column.prop(scene.arto, "lamps")
     if scene.arto.lamps and (text := lamps_line(scene)):
         say(column, context, text)

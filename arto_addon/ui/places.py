@@ -18,7 +18,7 @@ SIDEBARS = (
 )
 TAB = "ARTO"
 # Of a letter in Blender's interface, pixels at a scale of 1, on average and with room to spare.
-_LETTER = 6.2
+_LETTER = 5.9
 
 
 class Draws:
@@ -82,10 +82,7 @@ def say(
     column: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE"
 ) -> None:
     """A sentence, in as many lines as the region needs: a label is clipped at its end."""
-    scale = context.preferences.system.ui_scale
-    room = (context.region.width if context.region else 300) / scale
-    # what the frame of a panel, its scroll bar, and an icon take
-    letters = max(12, int((room - 56 - (22 if icon != "NONE" else 0)) / _LETTER))
+    letters = _letters(context, icon != "NONE")
     lines = column.column(align=True)
     lines.scale_y = 0.8
     text = tr(text)
@@ -99,3 +96,16 @@ def _lines(text: str, letters: int) -> list[str]:
     are twice as wide."""
     wide = any(ord(c) > 0x2E80 for c in text)
     return textwrap.wrap(text, letters // 2 if wide else letters) or [""]
+
+
+def shortened(context: bpy.types.Context, text: str) -> str:
+    """A text in one line, with dots where it is longer."""
+    return textwrap.shorten(text[:1].upper() + text[1:], _letters(context), placeholder="…")
+
+
+def _letters(context: bpy.types.Context, icon: bool = False) -> int:
+    """How many letters a line of the region has room for."""
+    scale = context.preferences.system.ui_scale
+    room = (context.region.width if context.region else 300) / scale
+    # what the frame of a panel, its scroll bar, and an icon take
+    return max(12, int((room - 56 - (22 if icon else 0)) / _LETTER))

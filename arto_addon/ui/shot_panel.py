@@ -11,7 +11,7 @@ from ..shot import status
 from ..stage.settings import looks_otherwise, samples_of
 from ..stage.stage import picture_size
 from . import state
-from .places import Draws, say
+from .places import Draws, say, shortened
 from .words import tr
 
 _ICONS = {
@@ -85,21 +85,20 @@ def _buttons(column: bpy.types.UILayout, context: bpy.types.Context, found: stat
 
 
 def running(column: bpy.types.UILayout, context: bpy.types.Context, job: Job) -> None:
-    """One bar over everything, what is done, and a cross."""
+    """One bar over everything, what is done, and a cross: as high as the button that it stands for,
+    so that nothing below it jumps while a hand is on it."""
     column.separator(factor=0.5)
-    text = session.plain(job.state.text)
-    say(column, context, text[0].upper() + text[1:])
+    column.label(text=shortened(context, session.plain(job.state.text)), translate=False)
     row = column.row(align=True)
-    row.scale_y = 1.3
+    row.scale_y = 1.6
     row.progress(factor=job.state.share, text=f"{job.state.share:.0%}")
     row.operator("arto.cancel", text="", icon="X")
-    line = "Stopping"
-    if not job.told and job.state.left is None:
-        line = tr("{spent} spent", spent=clock(job.spent))
-    elif not job.told:
-        left = clock(job.state.left or 0)
-        line = tr("{spent} spent, {left} left", spent=clock(job.spent), left=left)
-    say(column, context, line)
+    if job.told:
+        say(column, context, "Stopping")
+    else:
+        say(column, context, tr("{spent} spent", spent=clock(job.spent)))
+    left = job.state.left
+    say(column, context, " " if left is None else tr("{left} left", left=clock(left)))
 
 
 def ended(column: bpy.types.UILayout, context: bpy.types.Context, verbs: tuple[str, ...]) -> None:

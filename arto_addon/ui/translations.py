@@ -80,6 +80,7 @@ continues where it stopped | geht weiter, wo es aufhörte | 止まった所か�
 Captured, but not fitted yet | Aufgenommen, noch nicht angepasst | キャプチャ済み、未フィット
 Only the render region is captured | Nur der Renderbereich wird aufgenommen | レンダー領域のみキャプチャします
 Capture the shot to see it live | Für Live erst aufnehmen | ライブにはキャプチャが必要です
+Follows the world while you change it | Folgt der Welt, während du sie änderst | ワールドの変更に追従します
 Capture the shot first | Erst die Einstellung aufnehmen | 先にショットをキャプチャしてください
 Stopping | Wird beendet | 停止中
 {tiles} done, | {tiles} fertig, | {tiles} 完了、
@@ -94,7 +95,7 @@ Perhaps {time}, {samples} samples | Vielleicht {time}, {samples} Samples | お�
 {disk} while it runs, keeps {kept} | {disk} währenddessen, behält {kept} | 実行中 {disk}、保存 {kept}
 {camera}, frame {frame}, {width} x {height} | {camera}, Bild {frame}, {width} x {height} | {camera}、フレーム {frame}、{width} x {height}
 {spent} spent | {spent} vergangen | 経過 {spent}
-{spent} spent, {left} left | {spent} vergangen, noch {left} | 経過 {spent}、残り {left}
+{left} left | noch {left} | 残り {left}
 {samples} samples a pixel | {samples} Samples je Pixel | {samples} サンプル/ピクセル
 Look '{look}', {time} | Stimmung „{look}“, {time} | ルック「{look}」{time}
 {plate}, up to date | {plate}, aktuell | {plate}、最新

@@ -1,0 +1,274 @@
+"""An artist's hour in the window, with real keys and a real mouse: from an old file to a plate in
+comp. A picture of each step goes into the folder that ARTO_WALK names (`python -m tools.walk`)."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from arto.core import exr
+from program_tools import ROOT, Program, said
+from window_tools import Window, windows
+
+OLD = Path(os.environ.get("ARTO_SCENES") or ROOT.parent / "shared" / "scenes")
+SIZE = (240, 135)
+ARRANGE = """
+import sys
+live = next(m for n, m in sys.modules.items() if n.endswith(".arto_addon.live.live"))
+window = bpy.context.window_manager.windows[0]
+screen = window.screen
+view = next(a for a in screen.areas if a.type == "VIEW_3D")
+region = next(r for r in view.regions if r.type == "WINDOW")
+with bpy.context.temp_override(window=window, area=view, region=region):
+    bpy.ops.screen.area_split(direction="VERTICAL", factor=0.5)
+left, right = sorted((a for a in screen.areas if a.type == "VIEW_3D"), key=lambda a: a.x)
+left.ui_type = "IMAGE_EDITOR"
+right.spaces.active.region_3d.view_perspective = "CAMERA"
+right.spaces.active.show_region_ui = True
+for area in screen.areas:
+    if area.type == "PROPERTIES":
+        area.spaces.active.context = "RENDER"
+"""
+TAB = """
+for area in bpy.context.window_manager.windows[0].screen.areas:
+    for region in area.regions:
+        if area.type == "VIEW_3D" and region.type == "UI":
+            region.active_panel_category = "ARTO"
+"""
+REGION = (
+    "[[r.x, r.y, r.width, r.height] for a in "
+    "bpy.context.window_manager.windows[0].screen.areas "
+    "if a.type == {area!r} for r in a.regions if r.type == {region!r}][0]"
+)
+
+
+class Walk:
+    """A window, and the pictures that are taken on the way."""
+
+    def __init__(self, opener: Callable[..., Window], blend: Path, folder: Path | None) -> None:
+        self._opener, self.blend = opener, blend
+        self.w, self.folder, self.number = opener(blend), folder, 0
+
+    def again(self) -> Window:
+        """Another window on the same file."""
+        self.w = self._opener(self.blend)
+        return self.w
+
+    def shot(self, name: str) -> None:
+        """A picture of the screen as it is now."""
+        self.number += 1
+        if self.folder is None:
+            return
+        time.sleep(1.0)  # software draws slowly
+        path = self.folder / f"{self.number:02d}_{name}.png"
+        line = ["import", "-window", "root", "-resize", "1200x", "-colors", "96", f"png8:{path}"]
+        subprocess.run(line, env={**os.environ, "DISPLAY": self.w.display}, check=True)
+
+    def region(self, area: str, region: str) -> list[int]:
+        return self.w.get(REGION.format(area=area, region=region))
+
+    def sidebar(self, down: int, across: float = 0.45) -> tuple[int, int]:
+        """A place in the sidebar, so many pixels below its top."""
+        x, y, width, height = self.region("VIEW_3D", "UI")
+        return int(x + across * width), 900 - (y + height) + down
+
+    def picture(self, u: float, v: float) -> tuple[int, int]:
+        """A place on the picture that the image editor shows, from its left and bottom."""
+        x, y, _, _ = self.region("IMAGE_EDITOR", "WINDOW")
+        at = self.w.get(
+            f"[r.view2d.view_to_region({u}, {v}, clip=False) for a in "
+            "bpy.context.window_manager.windows[0].screen.areas if a.type == 'IMAGE_EDITOR' "
+            "for r in a.regions if r.type == 'WINDOW'][0]"
+        )
+        return x + at[0], 900 - (y + at[1])
+
+
+@pytest.fixture
+def walk(program: Program, tmp_path: Path) -> Iterator[Walk]:
+    source = OLD / "TorusLightsCams_250_compressed.blend"
+    if not source.is_file():
+        pytest.skip(f"{source} is not there: set ARTO_SCENES to the folder of old files")
+    blend = Path(shutil.copy(source, tmp_path / "old.blend"))
+    folder = Path(os.environ["ARTO_WALK"]) if os.environ.get("ARTO_WALK") else None
+    if folder:
+        folder.mkdir(parents=True, exist_ok=True)
+    with windows(program, tmp_path) as opener:
+        yield Walk(opener, blend, folder)
+
+
+# Places in the sidebar, in pixels below its top, while the shot's state is one line.
+CAPTURE, ROTATION, LIVE, ADD_LOOK = 117, 343, 431, 532
+# On the torus, from the left and the bottom of the picture.
+TORUS = (0.47, 0.415)
+BEGIN = f"""
+import pathlib
+scene = bpy.context.scene
+scene.render.engine = "CYCLES"
+scene.render.resolution_x, scene.render.resolution_y = {SIZE[0]}, {SIZE[1]}
+scene.render.resolution_percentage = 100
+scene.cycles.samples = 32
+sky = pathlib.Path(bpy.utils.system_resource("DATAFILES")) / "studiolights/world/sunset.exr"
+bpy.ops.arto.open_hdri(filepath=str(sky))
+# the lamps of 2010 outshine any sky
+scene.arto.own_lamps = 0.02
+scene.arto.memory = 250
+bpy.ops.wm.save_mainfile()
+"""
+MODULE = "next(m for n, m in __import__('sys').modules.items() if n.endswith('.arto_addon.{}'))"
+TOGGLE = """
+import addon_utils
+name = next(a.module for a in bpy.context.preferences.addons if a.module.endswith(".arto"))
+assert not addon_utils.disable(name)
+assert not hasattr(bpy.types.Scene, "arto") and not hasattr(bpy.types.World, "arto")
+assert addon_utils.enable(name) is not None
+"""
+NAMES = "sorted(i.name for i in bpy.data.images)"
+
+
+def test_an_hour_of_an_artist(walk: Walk, tmp_path: Path, program: Program) -> None:
+    w = walk.w
+    w.do(ARRANGE)
+    time.sleep(0.5)
+    w.do(TAB)
+    w.do(BEGIN)
+    state = MODULE.format("ui.state")
+    assert w.get(f"{state}.told(bpy.context.scene).lines[0]") == "No capture yet"
+    walk.shot("an_old_file")
+
+    # capture in one click; ESC; what is done stays, and one click goes on
+    w.click(*walk.sidebar(CAPTURE))
+    w.wait("session.current is not None")
+    w.wait("list(paths.place(bpy.context.scene).folder.glob('unfinished-*/tile_0001.exr*'))", 90)
+    walk.shot("capturing")
+    w.point(700, 300)
+    w.key("Escape")
+    assert w.idle(90)[0] == "WARNING"
+    told = f"{state}.told(bpy.context.scene)"
+    assert w.get(f"{told}.kind") == "unfinished", w.get(f"{told}.lines")
+    done = w.get(f"{told}.lines[0]")
+    assert "tiles done" in done
+    walk.shot("stopped")
+    w.click(*walk.sidebar(CAPTURE))
+    w.wait("session.current is not None")
+    level, text = w.idle(240)
+    assert level == "INFO", text
+    # the plate is there without another click, and up to date
+    assert w.get(f"{told}.kind") == "ready"
+    shown = (
+        "[a.spaces.active.image.name for a in bpy.context.window_manager.windows[0].screen.areas "
+        "if a.type == 'IMAGE_EDITOR' and a.spaces.active.image]"
+    )
+    assert w.get(shown) == ["ARTO Relit"]
+    result = MODULE.format("ui.result_panel")
+    assert w.get(f"{result}.plate_line(bpy.context.scene)")[1]
+    walk.shot("relit")
+
+    # live: a hand on the slider, then it rests, then it is finished
+    w.click(*walk.sidebar(LIVE))
+    w.wait("live.current is not None and live.current.settled", 60)
+    assert w.get(shown) == ["ARTO Live"]
+    before = w.get("bpy.context.scene.world.arto.rotation")
+    made = w.get("live.current.viewer.made")
+    x, y = walk.sidebar(ROTATION, 0.3)
+    w.point(x, y)
+    w.hold()
+    for step in range(36):
+        w.point(x + 2 * step, y)
+    walk.shot("turning_live")
+    w.let_go()
+    assert w.get("bpy.context.scene.world.arto.rotation") != before
+    assert w.get("live.current.viewer.made") >= made + 2
+    w.wait("live.current.settled", 60)
+    w.wait("session.current is not None", 30)
+    assert w.idle(90)[0] == "INFO"
+    assert w.get(shown) == ["ARTO Relit"]
+    assert w.get(f"{result}.plate_line(bpy.context.scene)")[1]
+    walk.shot("finished")
+    time.sleep(1.0)  # software draws slowly
+    w.click(*walk.sidebar(LIVE))
+    w.wait("live.current is None", 20)
+    assert "ARTO Live" not in w.get(NAMES)
+
+    # two looks, one of them red
+    w.click(*walk.sidebar(ADD_LOOK))
+    w.wait("len(bpy.context.scene.arto.looks) == 1")
+    w.do("bpy.ops.arto.add_look(name='Red')")
+    w.do("bpy.context.scene.world.arto.tint = (1, 0.25, 0.15)")
+    w.do("bpy.ops.arto.relight_looks('INVOKE_DEFAULT')")
+    assert w.idle(120)[0] == "INFO"
+    first, red = (
+        next(iter(exr.read(tmp_path / f"old_Scene_{name}.exr").values()))[..., :3].mean((0, 1))
+        for name in ("Look", "Red")
+    )
+    assert red[2] / red[0] < 0.5 * first[2] / first[0]
+    walk.shot("looks")
+    w.do("bpy.context.scene.arto.active_look = 0")
+
+    # layers, mixed in the compositor
+    w.do("bpy.context.scene.arto.layers = 'FACES'")
+    w.do("bpy.ops.arto.relight('INVOKE_DEFAULT')")
+    assert w.idle(120)[0] == "INFO"
+    w.do(
+        "area = next(a for a in bpy.context.window_manager.windows[0].screen.areas "
+        "if a.type == 'VIEW_3D'); area.ui_type = 'CompositorNodeTree'"
+    )
+    time.sleep(0.5)
+    w.do(
+        "mix = next(n for n in bpy.context.scene.compositing_node_group.nodes if "
+        "getattr(n, 'node_tree', None) and n.node_tree.name.endswith(' Mix')); "
+        "mix.inputs['LG_left'].default_value = 3.0; "
+        "region = next(r for r in area.regions if r.type == 'WINDOW'); "
+        "o = bpy.context.temp_override(window=bpy.context.window_manager.windows[0], "
+        "area=area, region=region); o.__enter__(); bpy.ops.node.view_all(); o.__exit__()"
+    )
+    walk.shot("mixing")
+    w.do("area.ui_type = 'VIEW_3D'")
+    time.sleep(0.3)
+    w.do(TAB)
+
+    # a pixel, and a place of the HDRI
+    w.do("bpy.ops.arto.show_plate()")
+    w.do("bpy.ops.arto.look_inside('INVOKE_DEFAULT')")
+    w.click(*walk.picture(*TORUS))
+    w.wait("'Lit' in bpy.context.window_manager.arto.seen", 30)
+    assert w.get(shown) == ["ARTO Inside"]
+    walk.shot("looking_inside")
+    w.do("bpy.ops.arto.light_from('INVOKE_DEFAULT')")
+    w.click(*walk.picture(1.5 / 4, 2.5 / 3))
+    w.wait("'comes from there' in bpy.context.window_manager.arto.seen", 30)
+    walk.shot("light_from_the_top")
+
+    # the truth, a few samples of it; and where the plate goes
+    w.do("bpy.ops.arto.verify('INVOKE_DEFAULT')")
+    assert w.idle(120)[0] == "INFO"
+    assert w.get(shown) == ["ARTO Verify"]
+    walk.shot("verified")
+    w.do("bpy.context.scene.arto.use_in_compositor = 'RENDER'")
+    w.do("bpy.ops.arto.save_composite('INVOKE_DEFAULT')")
+    level, text = w.idle(120)
+    assert level == "INFO", text
+    assert (tmp_path / "old_Scene_Look_composite.png").is_file()
+
+    # off and on again, save, close, open: all is there
+    w.do(TOGGLE)
+    w.do("bpy.ops.wm.save_mainfile()")
+    printed = w.quit()
+    assert "Traceback" not in printed and "rror:" not in printed, printed
+    again = walk.again()
+    assert again.get(f"{told}.kind") == "ready"
+    assert again.get("[l.name for l in bpy.context.scene.arto.looks]") == ["Look", "Red"]
+    assert again.get("bpy.context.scene.arto.use_in_compositor") == "RENDER"
+    assert "ARTO Live" not in again.get(NAMES)
+    printed = again.quit()
+    assert "Traceback" not in printed, printed
+
+    # and the file opens without ARTO
+    done = program.run("-b", "--factory-startup", tmp_path / "old.blend")
+    assert done.returncode == 0 and "Traceback" not in done.stdout + done.stderr, said(done)
+    assert not np.isnan(red).any()
