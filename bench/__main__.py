@@ -201,9 +201,15 @@ def _live(options: argparse.Namespace) -> None:
 
 
 def _plates(options: argparse.Namespace) -> None:
+    from . import specks
     from .plates import plates, table
 
     size = (options.width, options.width * 3 // 4)
+    if options.specks:
+        case = options.thing, options.ground
+        rows = specks.specks(options.json, *case, size, options.samples, options.many)
+        print(specks.table(rows))
+        return
     rows = plates(options.json, options.quick, size, options.samples, options.many)
     text = table(rows)
     if options.page:
@@ -323,6 +329,9 @@ def main() -> int:
     c = commands.add_parser("plates", help="shadow catchers beside Cycles' own")
     c.add_argument("--json", type=Path, default=Path("out/plates.json"))
     c.add_argument("--quick", action="store_true", help="two pairs of thing and ground")
+    c.add_argument("--specks", action="store_true", help="pixels that stand out, in 16 worlds")
+    c.add_argument("--thing", default="metal", help="of --specks")
+    c.add_argument("--ground", default="diffuse", help="of --specks")
     c.add_argument("--width", type=int, default=112)
     c.add_argument("--samples", type=int, default=128)
     c.add_argument("--many", type=int, default=512, help="samples of each of two references")

@@ -10,6 +10,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from .made_worlds import MADE, angles
+
 SKIES = {"sky10": 10.0, "sky35": 35.0, "sky70": 70.0}  # name -> the sun's height in degrees
 
 
@@ -36,6 +38,8 @@ class World:
         elif self.name in SKIES:
             image = _packed(self.name, sky_map(SKIES[self.name]))
             _set_world(scene, image, self.degrees, 1.0)
+        elif self.name in MADE:
+            _set_world(scene, _packed(self.name, MADE[self.name]()), self.degrees, 1.0)
         else:
             set_world_hdri(scene, self.name, rotation_degrees=self.degrees)
 
@@ -83,7 +87,7 @@ def right_light_map(height: int = 512) -> np.ndarray:
     beyond it would count as an error of the method. Convention of Cycles:
     u = 0.5 - atan2(y, x) / 2 pi, v = 0.5 + atan2(z, hypot(x, y)) / pi.
     """
-    azimuth, elevation = _angles(height)
+    azimuth, elevation = angles(height)
     x = np.cos(elevation) * np.cos(azimuth)
     y = np.cos(elevation) * np.sin(azimuth)
     z = np.broadcast_to(np.sin(elevation), x.shape)
@@ -111,7 +115,7 @@ def sky_map(elevation: float, height: int = 1024) -> np.ndarray:
     of CIE's clear sky (bright horizon, brighter near the sun); below the horizon is the ground that
     it lights. The sun is redder the lower it stands, and brings five to nine times the sky's light.
     """
-    azimuth, up = _angles(height)
+    azimuth, up = angles(height)
     sun_up, sun_azimuth = math.radians(elevation), math.radians(-50.0)
     cosine = np.sin(up) * math.sin(sun_up) + np.cos(up) * math.cos(sun_up) * np.cos(
         azimuth - sun_azimuth
@@ -144,7 +148,7 @@ def sky_map(elevation: float, height: int = 1024) -> np.ndarray:
 
 def softbox_map(height: int = 512) -> np.ndarray:
     """A dark room with three small softboxes of 5 to 8 degrees; shape and rows as `sky_map`."""
-    azimuth, up = _angles(height)
+    azimuth, up = angles(height)
     shape = np.broadcast_shapes(azimuth.shape, up.shape)
     light = np.full((*shape, 3), 0.01)
     boxes = (
@@ -162,13 +166,6 @@ def softbox_map(height: int = 512) -> np.ndarray:
         )
         light[inside] = radiance
     return light.astype(np.float32)
-
-
-def _angles(height: int) -> tuple[np.ndarray, np.ndarray]:
-    """Azimuth (1, 2 * height) and height above the horizon (height, 1) of a map's texels."""
-    azimuth = (0.5 - (np.arange(2 * height) + 0.5) / (2 * height)) * 2 * np.pi
-    up = ((np.arange(height) + 0.5) / height - 0.5)[:, None] * np.pi
-    return azimuth[None], up
 
 
 def _packed(name: str, pixels: np.ndarray) -> bpy.types.Image:

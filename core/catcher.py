@@ -62,24 +62,43 @@ def catch(whole: NDArray, ground: NDArray, things: NDArray, there: NDArray | Non
     ratio has all of it. there: (H, W), how much of a pixel the ground covers by itself (default:
     all).
     """
-    floor = FLOOR * _median(ground, there)
+    return catch_seen(*of_ground(whole, ground, things), things, there)
+
+
+def of_ground(whole: NDArray, ground: NDArray, things: NDArray) -> tuple[NDArray, NDArray]:
+    """What is seen of the ground beside things, and what would be without their shadows, (H, W, 3)
+    each, premultiplied by what the things leave.
+
+    A denoiser is given these, not the whole and the ground: it lets what is bright glow over its
+    outline, and beside a thing that would be light on the ground. In these two the outline is the
+    same, and what glows of it is the same share of both.
+    """
+    return whole - things[..., :3], (1 - things[..., 3])[..., None] * ground
+
+
+def catch_seen(
+    left: NDArray, bare: NDArray, things: NDArray, there: NDArray | None = None
+) -> Caught:
+    """As `catch`, of what `of_ground` gives: what is seen of the ground, and without shadows."""
     colour, alpha = things[..., :3], things[..., 3]
     seen = (1 - alpha)[..., None]
-    # what of the ground is seen, beside what would be without shadows
-    ratio = np.clip((whole - colour + floor * seen) / (seen * (ground + floor) + 1e-30), 0, MOST)
+    floor = FLOOR * _median(bare, seen[..., 0], there)
+    ratio = np.clip((left + floor * seen) / (bare + floor * seen + 1e-30), 0, MOST)
     trusted = np.clip((seen - HIDDEN) / (TRUSTED - HIDDEN), 0, 1)
     ratio = spread(ratio, trusted if there is None else trusted * (there > 0)[..., None])
     covered = 1.0 if there is None else there[..., None]
     share = seen * (1 + covered * (ratio - 1))
-    light = whole - colour - seen * ground
+    light = left - bare
     return Caught(*(part.astype(np.float32) for part in (colour, alpha, share, light)))
 
 
-def _median(ground: NDArray, there: NDArray | None) -> float:
+def _median(bare: NDArray, seen: NDArray, there: NDArray | None) -> float:
     """The median light of the ground where it is seen; as good as nothing of a black one."""
-    grey = ground.mean(axis=-1)
-    lit = grey[(grey > 0) if there is None else (there > 0.5) & (grey > 0)]
-    return float(np.median(lit)) if lit.size else 1e-6
+    grey = bare.mean(axis=-1)
+    known = (grey > 0) & (seen > TRUSTED)
+    if there is not None:
+        known &= there > 0.5
+    return float(np.median(grey[known] / seen[known])) if known.any() else 1e-6
 
 
 def spread(values: NDArray, weights: NDArray) -> NDArray[np.float32]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from bench.made_worlds import MADE
 from bench.seconds import (
     ARTO,
     RAW,
@@ -17,6 +19,7 @@ from bench.seconds import (
     break_even,
     price,
 )
+from bench.specks import WORLDS, specks_of
 
 TIMES = Times(
     own=Work(capture=17.8, fit=2.0, relight=0.6, denoised=1.0),
@@ -114,3 +117,27 @@ def test_a_stage_is_timed_in_a_process_of_its_own(tmp_path: Path) -> None:
     assert "| synthetic fit, 24 patches | 48x27 | module |" in table(rows)
     with pytest.raises(RuntimeError, match="the stage nothing"):
         _run("nothing", Size(48, 27, 16), tmp_path)
+
+
+def test_a_speck_is_what_the_truth_has_not() -> None:
+    """A planted one is found, with its size; an edge that the truth has too is none, and what is
+    covered does not count."""
+    truth = np.ones((20, 30, 3))
+    truth[:, 15:] = 0.4
+    bare = np.ones((20, 30), bool)
+    found = truth.copy()
+    found[8, 5, 1] += 0.3
+    assert specks_of(truth, truth, bare) == (0.0, 0)
+    over, seen = specks_of(found, truth, bare)
+    assert over == pytest.approx(0.3) and seen == 1
+    bare[8, 5] = False
+    assert specks_of(found, truth, bare) == (0.0, 0)
+
+
+def test_specks_are_looked_for_in_sixteen_worlds() -> None:
+    assert len(set(WORLDS)) == 16
+    maps = {name: make() for name, make in MADE.items()}
+    assert set(maps) <= set(WORLDS)
+    for image in maps.values():
+        assert image.shape == (512, 1024, 3) and image.dtype == np.float32
+        assert np.isfinite(image).all() and (image >= 0).all() and image.any()

@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.catcher import catch
+from ...core.catcher import catch_seen, of_ground
 from ...core.environment import Environment
 from ...core.errors import FieldError
 from ...core.field import Field
@@ -254,12 +254,20 @@ def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> S
     summed = []
     for take, picture, parts in zip(shown.takes, pictures, ready.rendered, strict=True):
         summed.append((yield from _with_own(take, ready, picture, parts)))
+    by = shown.takes
+    if len(by) > 1:
+        # of the first two what is divided by each other, and alike denoised: `of_ground`
+        whole, ground, apart = summed
+        apart = [np.maximum(part, 0) for part in apart]
+        things = [np.dstack([part, pictures[-1][..., 3]]) for part in apart]
+        divided = [of_ground(*parts) for parts in zip(whole, ground, things, strict=True)]
+        summed, by = [*map(list, zip(*divided, strict=True)), apart], [by[0], by[0], by[-1]]
     lap("relight")
     denoised = "no"
     if settings.denoise:
         yield Progress(0.7, "denoising")
         if denoise.available():
-            summed = [[t.denoised(*parts)] for t, parts in zip(shown.takes, summed, strict=True)]
+            summed = [[t.denoised(*parts)] for t, parts in zip(by, summed, strict=True)]
             denoised = "Open Image Denoise"
         else:
             # said here, in the file's header and in the last line
@@ -268,12 +276,13 @@ def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> S
         lap("denoise")
     for picture, parts in zip(pictures, summed, strict=True):
         picture[..., :3] = sum(parts)
-        # a plane laid through a sun beside darkness undershoots; a picture has no negative light
-        np.maximum(picture, 0, out=picture)
-    picture, caught = pictures[0], None
+    picture, caught = pictures[-1], None
+    # a plane laid through a sun beside darkness undershoots; a picture has no negative light, while
+    # what is left of two is off to both sides
+    np.maximum(picture, 0, out=picture)
     if len(pictures) > 1:
-        whole, alone, apart = pictures
-        caught = catch(whole[..., :3], alone[..., :3], apart, alone[..., 3])
+        left, bare, apart = pictures
+        caught = catch_seen(left[..., :3], bare[..., :3], apart, bare[..., 3])
         picture = caught.plate
         lap("catcher")
     things = picture[..., :3].copy()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from arto.core.catcher import MOST, catch, spread
+from arto.core.catcher import MOST, catch, catch_seen, of_ground, spread
 
 SIZE = (48, 64)
 
@@ -140,3 +140,24 @@ def test_over_the_ground_itself_both_ways_are_the_whole_picture(rng):
     nothing = catch(ground, ground, NOTHING)
     footage = rng.uniform(size=(*SIZE, 3)).astype(np.float32)
     np.testing.assert_array_equal(nothing.added_to(footage), footage)
+
+
+def smeared(image):
+    """As a denoiser smears an outline: over a pixel to each side."""
+    padded = np.pad(image, ((1, 1), (1, 1), (0, 0)), mode="edge")
+    height, width = image.shape[:2]
+    return np.mean([padded[y : y + height, x : x + width] for y in range(3) for x in range(3)], 0)
+
+
+def test_what_glows_over_an_outline_is_no_light_on_the_ground(rng):
+    """Ten times as bright as the ground, a thing beside it: what is divided is smeared alike, and
+    the shadow beside the outline is what it was. Smeared itself, the picture has specks there."""
+    ground, shadow = ground_of(rng)
+    things = disc(soft=0.01)
+    apart = plate(things, (5, 5, 5))
+    whole = apart[..., :3] + (1 - things)[..., None] * shadow * ground
+    bare = things == 0
+    left, seen = (smeared(part) for part in of_ground(whole, ground, apart))
+    alike = np.abs(catch_seen(left, seen, apart).share - shadow)[bare]
+    before = np.abs(catch(smeared(whole), smeared(ground), apart).share - shadow)[bare]
+    assert alike.max() < 0.05 < 1 < before.max()
