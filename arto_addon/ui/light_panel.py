@@ -75,7 +75,7 @@ def _live(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
     elif live.trouble:
         say(column, context, live.trouble[0].upper() + live.trouble[1:], "ERROR")
     elif there:
-        say(column, context, "Follows the world while you change it")
+        say(column, context, "Follows the world as you change it")
     else:
         say(column, context, "Capture the shot to see it live", "INFO")
     column.prop(scene.arto, "lamps")

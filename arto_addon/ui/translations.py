@@ -80,7 +80,7 @@ continues where it stopped | geht weiter, wo es aufhörte | 止まった所か�
 Captured, but not fitted yet | Aufgenommen, noch nicht angepasst | キャプチャ済み、未フィット
 Only the render region is captured | Nur der Renderbereich wird aufgenommen | レンダー領域のみキャプチャします
 Capture the shot to see it live | Für Live erst aufnehmen | ライブにはキャプチャが必要です
-Follows the world while you change it | Folgt der Welt, während du sie änderst | ワールドの変更に追従します
+Follows the world as you change it | Folgt der Welt, während du sie änderst | ワールドの変更に追従します
 Capture the shot first | Erst die Einstellung aufnehmen | 先にショットをキャプチャしてください
 Stopping | Wird beendet | 停止中
 {tiles} done, | {tiles} fertig, | {tiles} 完了、
