@@ -22,7 +22,8 @@ import numpy as np
 from ...core.environment import Environment
 from ...core.errors import SceneError
 from ...core.files import whole
-from ..blender.nodes import trees
+from ..blender.colour import working_space
+from ..blender.nodes import shader_tree, trees
 from ..shot import paths
 from ..shot.fingerprint import of_blocks
 from .bake import bake
@@ -74,7 +75,7 @@ def painted(
     has not one HDRI alone.
     """
     with _without_dials(world) as (plain, _, _):
-        found = [n for t in trees(plain.node_tree, set()) for n in t.nodes]
+        found = [n for t in trees(shader_tree(plain), set()) for n in t.nodes]
         textures = [n for n in found if n.bl_idname == "ShaderNodeTexEnvironment" and n.image]
         if len(textures) != 1 or textures[0].id_data != plain.node_tree:
             raise SceneError(
@@ -112,7 +113,7 @@ def _write(path: Path, image: np.ndarray) -> None:
 
 def _key(scene: bpy.types.Scene, world: bpy.types.World, width: int) -> str:
     """What a map hangs on, in sixteen letters."""
-    of: list[Any] = [VERSION, width, bpy.app.version_string, bpy.data.colorspace.working_space]
+    of: list[Any] = [VERSION, width, bpy.app.version_string, working_space()]
     # a copy of the world has another name
     found = of_blocks([world])
     of.append(sorted(("World" if k.startswith("World") else k, v) for k, v in found.items()))
@@ -120,7 +121,7 @@ def _key(scene: bpy.types.Scene, world: bpy.types.World, width: int) -> str:
         node.bl_idname == "ShaderNodeTexEnvironment"
         and node.image
         and node.image.source in {"SEQUENCE", "MOVIE"}
-        for tree in trees(world.node_tree, set())
+        for tree in trees(shader_tree(world), set())
         for node in tree.nodes
     )
     if moving:
@@ -152,7 +153,8 @@ def _without_dials(world: bpy.types.World) -> Iterator[tuple[Any, float, float]]
 def _dials(world: bpy.types.World) -> tuple[Any, Any]:
     """The background node whose strength is that of all the world, and the mapping node that turns
     it; None where there is no such one."""
-    out = world.node_tree.get_output_node("CYCLES") if world.node_tree else None
+    tree = shader_tree(world)
+    out = tree.get_output_node("CYCLES") if tree else None
     links = out.inputs["Surface"].links if out else ()
     if not links or links[0].is_muted:
         return None, None
@@ -160,10 +162,10 @@ def _dials(world: bpy.types.World) -> tuple[Any, Any]:
     if background.bl_idname != "ShaderNodeBackground" or background.mute:
         return None, None
     dial = None if background.inputs["Strength"].is_linked else background
-    nodes = [n for n in world.node_tree.nodes if not n.mute]
+    nodes = [n for n in tree.nodes if not n.mute]
     textures = [n for n in nodes if n.bl_idname == "ShaderNodeTexEnvironment"]
     mappings = [n for n in nodes if n.bl_idname == "ShaderNodeMapping"]
-    if len(textures) != 1 or len(mappings) != 1 or len(nodes) != len(world.node_tree.nodes):
+    if len(textures) != 1 or len(mappings) != 1 or len(nodes) != len(tree.nodes):
         return dial, None
     texture, mapping = textures[0], mappings[0]
     into, source = texture.inputs["Vector"].links, mapping.inputs["Vector"].links
