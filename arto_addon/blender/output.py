@@ -39,15 +39,23 @@ def _as_new(settings: Any) -> None:
         bpy.data.scenes.remove(new)
 
 
+def set_format(settings: Any, media: str, kind: str) -> None:
+    """Choose a file format; from Blender 5 on it is among those of a medium."""
+    if FIVE:
+        settings.media_type = media
+    settings.file_format = kind
+
+
 def float_exr(render: bpy.types.RenderSettings, multilayer: bool = True) -> None:
     """Set a scene's output to 32-bit float EXR of a part for each pass, and nothing over it."""
     for name, value in _WRITING.items():
         setattr(render, name, value)
     settings = render.image_settings
     _as_new(settings)
-    if FIVE:
-        settings.media_type = "MULTI_LAYER_IMAGE" if multilayer else "IMAGE"
-    settings.file_format = "OPEN_EXR_MULTILAYER" if multilayer else "OPEN_EXR"
+    if multilayer:
+        set_format(settings, "MULTI_LAYER_IMAGE", "OPEN_EXR_MULTILAYER")
+    else:
+        set_format(settings, "IMAGE", "OPEN_EXR")
     settings.color_mode = "RGBA"
     settings.color_depth = "32"
     settings.exr_codec = "NONE"  # files that are read again at once; packing takes longer
