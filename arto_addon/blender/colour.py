@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
-
 import bpy
-import numpy as np
+from mathutils import Color
 
-from ...core import exr
 from ...core.errors import SceneError
 from .version import FIVE
 
@@ -16,37 +12,42 @@ _found: list[str] = []
 
 
 def working_space() -> str:
-    """Its name, as Blender lists it for images."""
+    """Its name, as Blender lists it for images. Raises SceneError where that cannot be told."""
     if FIVE:
         return bpy.data.colorspace.working_space
     if not _found:
-        _found.append(_looked_for())
+        _found.append(_looked_up())
     return _found[0]
 
 
-def _looked_for() -> str:
-    """Blender 4.5 names it nowhere, and a studio's OpenColorIO may have any: it is the space of
-    which Blender takes an image's numbers as they are. Raises SceneError."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "primaries.exr"
-        exr.write(path, {"": np.eye(3, dtype=np.float32)[None] * 0.5 + 0.25})
-        image = bpy.data.images.load(str(path))
-        usual = bpy.data.images.new("ARTO Space", 1, 1, float_buffer=True)
-        try:
-            pixels = np.empty(12, np.float32)
-            there = image.colorspace_settings
-            names = [item.identifier for item in there.bl_rna.properties["name"].enum_items]
-            # what Blender itself gives to images of light is asked first
-            for name in dict.fromkeys([usual.colorspace_settings.name, *names]):
-                there.name = name
-                if there.is_data:
-                    continue
-                image.pixels.foreach_get(pixels)
-                if np.abs(pixels.reshape(3, 4)[:, :3] - np.eye(3) * 0.5 - 0.25).max() < 1e-6:
-                    return name
-        finally:
-            bpy.data.batch_remove([image, usual])
-    raise SceneError(
-        "Blender's colour management names no colour space for the light it works with: look at "
-        "its OpenColorIO configuration"
-    )
+def _looked_up() -> str:
+    """Blender 4.5 says it nowhere, but has the library with it that it reads its configuration by;
+    and a studio's may have any space. Asked for while a panel is drawn, which may make nothing."""
+    listed = bpy.types.ColorManagedInputColorspaceSettings.bl_rna.properties["name"].enum_items
+    found = _by_role() or _by_primaries()
+    if found not in listed:
+        raise SceneError(
+            "it cannot be told which colour space Blender works in: look at scene_linear in your "
+            "OpenColorIO configuration"
+        )
+    return found
+
+
+def _by_role() -> str:
+    """As the configuration that Blender has read names it; empty where nothing reads that."""
+    bpy.utils.expose_bundled_modules()
+    try:
+        import PyOpenColorIO
+    except ImportError:  # a distribution's Blender may be without
+        return ""
+    return PyOpenColorIO.GetCurrentConfig().getRoleColorSpace("scene_linear") or ""
+
+
+def _by_primaries() -> str:
+    """Blender's own, where the numbers are those of it; else empty."""
+    for i in range(3):
+        one = Color([float(i == j) for j in range(3)])
+        other = one.from_scene_linear_to_rec709_linear()
+        if max(abs(a - b) for a, b in zip(one, other, strict=True)) > 1e-4:
+            return ""
+    return "Linear Rec.709"
