@@ -55,7 +55,7 @@ def fresh_scene(width: int, height: int) -> bpy.types.Scene:
 
 
 def noded(block: Any) -> Any:
-    """A new material or world with its nodes, which Blender 4.5 gives it where they are asked for."""
+    """A new material or world with its nodes, for which Blender 4.5 has to be asked."""
     if block.node_tree is None:
         block.use_nodes = True
     return block

@@ -111,7 +111,7 @@ def test_a_studios_working_space_is_found(tmp_path):
     config.write_text(text)
     code = "import bpy; from arto.arto_addon.blender.colour import working_space as w; print(w())"
     for path, name in ((config, "ACEScg"), (own / "config.ocio", "Linear Rec.709")):
-        environment = os.environ | {"OCIO": str(path), "PYTHONPATH": os.pathsep.join(sys.path)}
+        environment = os.environ | {"OCIO": str(path)}
         done = subprocess.run(
             [sys.executable, "-c", code], env=environment, capture_output=True, text=True
         )
