@@ -1,4 +1,4 @@
-"""What an artist's file may have in Blender 4.5 and no longer in Blender 5."""
+"""What is otherwise in Blender 4.5 than in Blender 5, for an artist's file and for ARTO."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ from arto.arto_addon.world.detail import detail
 from scene_tools import assert_as_cycles, captured, set_colour, small_scene
 from test_relight import run_all
 
-pytestmark = pytest.mark.skipif(FIVE, reason="Blender 5 has no Use Nodes to turn off")
+without_nodes = pytest.mark.skipif(FIVE, reason="from Blender 5 on there is no Use Nodes")
 
 
+@without_nodes
 @pytest.mark.parametrize("left", [False, True])
 def test_a_world_without_nodes_is_its_colour(tmp_path, left):
     """Whether it never had nodes, or has some that it does not use."""
@@ -50,6 +51,7 @@ def test_a_world_without_nodes_is_its_colour(tmp_path, left):
     assert_as_cycles(run_all(scene), scene, 256, tmp_path)
 
 
+@without_nodes
 def test_a_material_without_nodes_keeps_its_look(tmp_path):
     """On a thing, and as the view layer's for all of them."""
     scene = small_scene(tmp_path)
@@ -65,6 +67,7 @@ def test_a_material_without_nodes_keeps_its_look(tmp_path):
     assert not clay.use_nodes and clay.node_tree is None
 
 
+@without_nodes
 def test_a_compositor_that_is_off_stays_so(tmp_path, capsys):
     """It gains the node, and it is said what is to be done to see it; what is in it is no footage,
     and a render is what it was."""
@@ -102,6 +105,7 @@ def test_a_new_layer_is_seen_where_the_mixer_is_in_use(tmp_path):
     assert all(s.default_value == 1 for s in new)
 
 
+@pytest.mark.skipif(FIVE, reason="Blender 5 names its working space itself")
 def test_a_studios_working_space_is_found(tmp_path):
     """By its role, whatever it is."""
     own = Path(bpy.utils.system_resource("DATAFILES", path="colormanagement"))
