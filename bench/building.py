@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import bpy  # first: bmesh is only there once it is
 
@@ -53,11 +54,18 @@ def fresh_scene(width: int, height: int) -> bpy.types.Scene:
     return scene
 
 
+def noded(block: Any) -> Any:
+    """A new material or world with its nodes, for which Blender 4.5 has to be asked."""
+    if block.node_tree is None:
+        block.use_nodes = True
+    return block
+
+
 def materials_of(looks: dict[str, Look]) -> dict[str, bpy.types.Material]:
     """New materials by name, each with its `pass_index`, numbered from 1."""
     materials = {}
     for index, (name, look) in enumerate(looks.items(), start=1):
-        material = materials[name] = bpy.data.materials.new(name)
+        material = materials[name] = noded(bpy.data.materials.new(name))
         material.pass_index = index
         inputs = material.node_tree.nodes["Principled BSDF"].inputs
         for key, value in look.items():

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+from arto.arto_addon.blender.nodes import new_material
 from arto.arto_addon.world.bake import bake
 from arto.core import metrics
 from arto.core.light import PatchLight
@@ -24,7 +25,7 @@ INDICES = (("R", (1, 0, 0, 1), 1.45), ("G", (0, 1, 0, 1), 1.55), ("B", (0, 0, 1,
 
 def _prism() -> bpy.types.Material:
     """Glass whose index differs by channel: three refractions, a channel each, added up."""
-    material = bpy.data.materials.new("prism")
+    material = new_material("prism")
     tree = material.node_tree
     tree.nodes.clear()
     total = None
@@ -47,7 +48,7 @@ def _prism() -> bpy.types.Material:
 
 def _coat() -> bpy.types.Material:
     """A rough red under a mirror of blue."""
-    material = bpy.data.materials.new("coat")
+    material = new_material("coat")
     shader = material.node_tree.nodes["Principled BSDF"]
     shader.inputs["Base Color"].default_value = (0.8, 0.05, 0.02, 1)
     shader.inputs["Roughness"].default_value = 1.0

@@ -14,7 +14,7 @@ import numpy as np
 from arto.core import exr
 from mathutils import Matrix
 
-from .building import add_aimed
+from .building import add_aimed, noded
 
 Change = Callable[[bpy.types.Scene], None]
 CASES: dict[str, tuple[str, Change]] = {}
@@ -108,7 +108,7 @@ def a_room_by_its_window(scene):
 @case()
 def alpha_cards(scene):
     """Forty leaves one behind the other, half of each clear."""
-    material = bpy.data.materials.new("leaf")
+    material = noded(bpy.data.materials.new("leaf"))
     material.node_tree.nodes["Principled BSDF"].inputs["Alpha"].default_value = 0.1
     for i in range(40):
         y = -1.5 - 0.02 * i

@@ -25,6 +25,7 @@ from .building import (
     fresh_scene,
     lathe,
     materials_of,
+    noded,
     sphere,
 )
 
@@ -155,7 +156,7 @@ def _fur(
 
 def _cloud(scene: bpy.types.Scene, *, centre: Point, radius: float) -> None:
     """A ball of even fog."""
-    material = bpy.data.materials.new("cloud")
+    material = noded(bpy.data.materials.new("cloud"))
     tree = material.node_tree
     tree.nodes.clear()
     fog = tree.nodes.new("ShaderNodeVolumePrincipled")

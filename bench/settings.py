@@ -18,6 +18,8 @@ from typing import Any
 import bpy
 import numpy as np
 from arto.arto_addon import fit, work
+from arto.arto_addon.blender.colour import working_space
+from arto.arto_addon.blender.nodes import new_world
 from arto.arto_addon.blender.output import float_exr, write_to
 from arto.arto_addon.capture import capture
 from arto.arto_addon.relight import relight
@@ -62,10 +64,10 @@ def make() -> bpy.types.Scene:
     lamp.rotation_euler = (0.7, 0.2, 0)
     scene.collection.objects.link(lamp)
     image = bpy.data.images.new("one colour", 8, 4, float_buffer=True)
-    image.colorspace_settings.name = bpy.data.colorspace.working_space
+    image.colorspace_settings.name = working_space()
     image.pixels.foreach_set(np.tile([RADIANCE, RADIANCE, RADIANCE, 1], 32).astype(np.float32))
     image.pack()
-    world = scene.world or bpy.data.worlds.new("World")
+    world = scene.world or new_world("World")
     scene.world = world
     nodes = world.node_tree.nodes
     texture = nodes.new("ShaderNodeTexEnvironment")

@@ -10,6 +10,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from .building import noded
 from .made_worlds import MADE, angles
 
 SKIES = {"sky10": 10.0, "sky35": 35.0, "sky70": 70.0}  # name -> the sun's height in degrees
@@ -30,7 +31,7 @@ class World:
         if self.name == "right":
             set_world_right(scene)
         elif self.name == "white":
-            scene.world = bpy.data.worlds.new("white")
+            scene.world = noded(bpy.data.worlds.new("white"))
             background = scene.world.node_tree.nodes["Background"]
             background.inputs["Color"].default_value = (1, 1, 1, 1)
         elif self.name == "softboxes":
@@ -190,7 +191,7 @@ def _set_world(
     scene: bpy.types.Scene, image: bpy.types.Image, rotation_degrees: float, strength: float
 ) -> bpy.types.World:
     """Give the scene a new world that shows an equirectangular image."""
-    world = bpy.data.worlds.new(image.name)
+    world = noded(bpy.data.worlds.new(image.name))
     nodes, links = world.node_tree.nodes, world.node_tree.links
     background = nodes["Background"]
     background.inputs["Strength"].default_value = strength

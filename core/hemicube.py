@@ -223,7 +223,7 @@ class Hemicube:
             c, eu, ev = (np.array(a) for a in FACES[face])
             axis = int(np.abs(c).argmax())
             hit = (major == axis) & (np.sign(c[axis]) * local[axis] > 0)
-            own = local[:, hit]
+            own = local[:, hit].astype(np.float64)
             depth = np.abs(own[axis])
             x, y = (own[int(np.abs(e).argmax())] * e.sum() / depth for e in (eu, ev))
             if self.leaves:

@@ -116,7 +116,7 @@ class PatchLight:
             u, v = self.bin_centres(int(k))
             solid_angle = 1e-3 * self.hemicube.solid_angles[k] / self.resolutions[k] ** 2
             light = environment.at(self.hemicube.directions(int(k), u[i], v[j]))
-            bins[j, i, :3] = light * solid_angle
+            bins[j, i, :3] = light.astype(np.float64) * solid_angle
             bins[j, i, 3] = solid_angle
 
     @cached_property

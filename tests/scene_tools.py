@@ -11,6 +11,8 @@ from typing import Any
 import bpy
 import numpy as np
 from arto.arto_addon import work
+from arto.arto_addon.blender.compositing import add_output, new_compositor
+from arto.arto_addon.blender.nodes import new_material, new_world
 from arto.arto_addon.capture import capture as capture_module
 from arto.arto_addon.shot import scene_id
 from arto.core.capture_set import CaptureSet
@@ -19,7 +21,7 @@ WIDTH, HEIGHT = 24, 18
 
 
 def material(name: str, **inputs: Any) -> bpy.types.Material:
-    out = bpy.data.materials.new(name)
+    out = new_material(name)
     shader = out.node_tree.nodes["Principled BSDF"]
     for key, value in inputs.items():
         shader.inputs[key.replace("_", " ")].default_value = value
@@ -59,7 +61,7 @@ def small_scene(folder: Path, lamp: bool = False) -> bpy.types.Scene:
     scene.collection.objects.link(camera)
     camera.location, camera.rotation_euler = (0, -9, 4), (math.radians(70), 0, 0)
     scene.camera = camera
-    scene.world = bpy.data.worlds.new("World")
+    scene.world = new_world("World")
     if lamp:
         light = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
         light.data.energy = 2.0
@@ -132,12 +134,10 @@ def made_by_nodes(thing: bpy.types.Object, maker: bpy.types.Object) -> None:
 
 def in_compositor(scene: bpy.types.Scene, group: Any, output: str) -> Any:
     """A node group's node in a compositor of the scene that puts out one of its outputs."""
-    tree = bpy.data.node_groups.new("Comp", "CompositorNodeTree")
-    tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
-    node, out = tree.nodes.new("CompositorNodeGroup"), tree.nodes.new("NodeGroupOutput")
+    tree = new_compositor(scene, "Comp")
+    node, out = tree.nodes.new("CompositorNodeGroup"), add_output(tree)
     node.node_tree = group
     tree.links.new(node.outputs[output], out.inputs[0])
-    scene.compositing_node_group = tree
     return node
 
 

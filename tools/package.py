@@ -24,9 +24,10 @@ from .wheel_symbols import copy_symbolic
 
 ROOT = Path(__file__).resolve().parent.parent
 SHIPPED = ("__init__.py", "arto_addon", "core", "LICENSE", "README.md")
-# The official Blender 5.2 runs the first, Linux distributions build it with the second. All wheels
-# go into one zip: Blender unpacks the one of its own Python and platform, and passes by the others.
-PYTHONS = ("3.13", "3.14")
+# Blender 4.5 runs the first, the official 5.2 the second, and Linux distributions build that with
+# the third. All wheels go into one zip: Blender unpacks the one of its own Python and platform, and
+# passes by the others.
+PYTHONS = ("3.11", "3.13", "3.14")
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,7 @@ TARGETS = (
     Target("linux-x64", "manylinux_2_28_x86_64", ("Linux", "x86_64")),
     Target("windows-x64", "win_amd64", ("Windows", "AMD64")),
     Target("macos-arm64", "macosx_11_0_arm64", ("Darwin", "arm64")),
+    Target("macos-x64", "macosx_10_15_x86_64", ("Darwin", "x86_64")),
 )
 
 

@@ -1,4 +1,8 @@
-"""Blender's compositor, borrowed for one picture: in a scene of its own, which goes afterwards."""
+"""Blender's compositor: a scene's own, and one that is borrowed for a picture.
+
+From Blender 5 on a scene's compositor is a node group with an output, before it is a tree of the
+scene's with a Composite node; and what were settings of nodes became sockets.
+"""
 
 from __future__ import annotations
 
@@ -15,18 +19,66 @@ from numpy.typing import NDArray
 from ...core import exr
 from ..work import Render, blocking_render
 from .output import float_exr, write_to
+from .version import FIVE
 
 # The kind of node that puts a scene's picture out.
-OUTPUT = "NodeGroupOutput"
+OUTPUT = "NodeGroupOutput" if FIVE else "CompositorNodeComposite"
+# By node and socket: the setting that Blender 4.5 has in the place of a menu.
+_SETTINGS = {
+    ("CompositorNodeDenoise", "Prefilter"): "prefilter",
+    ("CompositorNodeScale", "Type"): "space",
+    ("CompositorNodeScale", "Frame Type"): "frame_method",
+    ("CompositorNodeSetAlpha", "Type"): "mode",
+    ("CompositorNodeBlur", "Type"): "filter_type",
+}
+
+
+def choose(node: Any, menu: str, choice: str) -> None:
+    """Choose of a node's menu, both by the names that the artist reads."""
+    if FIVE:
+        node.inputs[menu].default_value = choice
+    else:
+        setattr(node, _SETTINGS[node.bl_idname, menu], choice.upper().replace(" ", "_"))
 
 
 def compositor(scene: bpy.types.Scene) -> Any:
     """The tree of a scene's compositor, None where it has none."""
-    return scene.compositing_node_group
+    return scene.compositing_node_group if FIVE else scene.node_tree
+
+
+def turned_off(scene: bpy.types.Scene) -> bool:
+    """Whether a scene has a compositor that it does not use: Use Nodes, before Blender 5."""
+    return not FIVE and scene.node_tree is not None and not scene.use_nodes
+
+
+def new_compositor(scene: bpy.types.Scene, name: str) -> Any:
+    """An empty tree as the scene's compositor; its name is seen from Blender 5 on."""
+    if FIVE:
+        tree = bpy.data.node_groups.new(name, "CompositorNodeTree")
+        tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+        scene.compositing_node_group = tree
+        return tree
+    scene.use_nodes = True
+    scene.node_tree.nodes.clear()
+    return scene.node_tree
+
+
+def add_output(tree: Any) -> Any:
+    """The node of a scene's compositor that puts out what is linked to its input 'Image'."""
+    return tree.nodes.new(OUTPUT)
+
+
+def places_of_groups() -> Iterator[Any]:
+    """Every tree that may have a compositor's node group in it."""
+    yield from bpy.data.node_groups
+    if not FIVE:
+        yield from (s.node_tree for s in bpy.data.scenes if s.node_tree)
 
 
 def own_compositor(copy: bpy.types.Scene, made: list[Any]) -> Any:
     """The tree of a copied scene's compositor, made its own; noted in `made` where it must go."""
+    if not FIVE:
+        return copy.node_tree  # which was copied with it
     copy.compositing_node_group = copy.compositing_node_group.copy()
     made.append(copy.compositing_node_group)
     return copy.compositing_node_group
@@ -43,8 +95,7 @@ class Studio:
 
         size: width and height; text: what this is, where it is told. Raises CancelledError.
         """
-        out = self.tree.nodes.new("NodeGroupOutput")
-        self.tree.links.new(socket, out.inputs[0])
+        self.tree.links.new(socket, add_output(self.tree).inputs[0])
         render = self.scene.render
         render.engine = "CYCLES"
         render.resolution_x, render.resolution_y = size
@@ -76,10 +127,9 @@ def studio(name: str) -> Iterator[Studio]:
     scene = bpy.data.scenes.new(name)
     made: list[Any] = [scene]
     try:
-        tree = bpy.data.node_groups.new(name, "CompositorNodeTree")
-        made.append(tree)
-        tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
-        scene.compositing_node_group = tree
+        tree = new_compositor(scene, name)
+        if not tree.is_embedded_data:
+            made.append(tree)
         with tempfile.TemporaryDirectory() as folder:
             yield Studio(scene, tree, made, Path(folder))
     finally:

@@ -7,6 +7,8 @@ from typing import Any
 
 import bpy
 
+from .version import FIVE
+
 
 class Nodes:
     """A few calls that make building a node tree read like the formula it is."""
@@ -28,6 +30,52 @@ class Nodes:
 
     def math(self, operation: str, *inputs: Any) -> Any:
         return self.add("ShaderNodeMath", *inputs, operation=operation).outputs[0]
+
+
+def new_material(name: str) -> Any:
+    """A material with the nodes that Blender gives it."""
+    return _noded(bpy.data.materials.new(name))
+
+
+def new_world(name: str) -> Any:
+    """A world with the nodes that Blender gives it."""
+    return _noded(bpy.data.worlds.new(name))
+
+
+def _noded(block: Any) -> Any:
+    if not FIVE:
+        block.use_nodes = True
+    return block
+
+
+def shader_tree(block: Any) -> Any:
+    """The tree that a material, world or lamp is rendered by; None where it has none in use."""
+    return block.node_tree if FIVE or block.use_nodes else None
+
+
+def made_of_nodes(material: Any) -> Any:
+    """The tree that a material of our own is rendered by. One that does without nodes, as it can
+    before Blender 5, gets those that look the same."""
+    if shader_tree(material) is None:
+        material.use_nodes = True
+        tree = material.node_tree
+        tree.nodes.clear()
+        shader = Nodes(tree).add("ShaderNodeBsdfDiffuse", material.diffuse_color)
+        Nodes(tree).add("ShaderNodeOutputMaterial", shader.outputs[0])
+    return material.node_tree
+
+
+def world_of_nodes(world: Any) -> Any:
+    """The tree of a world, which is given one where it does without, as it can before Blender 5:
+    one that shows its colour, as the world did."""
+    if shader_tree(world) is None:
+        world.use_nodes = True
+        tree = world.node_tree
+        tree.nodes.clear()
+        nodes = Nodes(tree)
+        light = nodes.add("ShaderNodeBackground", (*world.color, 1.0), 1.0)
+        nodes.add("ShaderNodeOutputWorld", light.outputs[0])
+    return world.node_tree
 
 
 def trees(tree: Any, seen: set[int]) -> Iterator[Any]:

@@ -7,19 +7,22 @@ from typing import Any
 
 import bpy
 
+from .version import FIVE
+
 # What of a scene's render settings decides how a picture is written, or what is laid over it, and
 # not what is rendered: each as here, whatever the artist's file says.
 _WRITING = {
     "use_file_extension": False,
     "use_overwrite": True,
     "use_placeholder": False,
-    "save_output": True,
     "use_multiview": False,
     "use_stamp": False,
     "use_sequencer": False,
     "use_freestyle": False,
     "dither_intensity": 0.0,
 }
+if FIVE:
+    _WRITING["save_output"] = True  # before, what is rendered to be written is written
 
 
 def _as_new(settings: Any) -> None:
@@ -28,12 +31,19 @@ def _as_new(settings: Any) -> None:
     try:
         there = new.render.image_settings
         # what may be chosen for the rest follows from these
-        first = ["media_type", "file_format"]
+        first = ["media_type", "file_format"] if FIVE else ["file_format"]
         names = [p.identifier for p in there.bl_rna.properties if not p.is_readonly]
         for name in first + [n for n in names if n not in first]:
             setattr(settings, name, getattr(there, name))
     finally:
         bpy.data.scenes.remove(new)
+
+
+def set_format(settings: Any, media: str, kind: str) -> None:
+    """Choose a file format; from Blender 5 on it is among those of a medium."""
+    if FIVE:
+        settings.media_type = media
+    settings.file_format = kind
 
 
 def float_exr(render: bpy.types.RenderSettings, multilayer: bool = True) -> None:
@@ -42,12 +52,15 @@ def float_exr(render: bpy.types.RenderSettings, multilayer: bool = True) -> None
         setattr(render, name, value)
     settings = render.image_settings
     _as_new(settings)
-    settings.media_type = "MULTI_LAYER_IMAGE" if multilayer else "IMAGE"
-    settings.file_format = "OPEN_EXR_MULTILAYER" if multilayer else "OPEN_EXR"
+    if multilayer:
+        set_format(settings, "MULTI_LAYER_IMAGE", "OPEN_EXR_MULTILAYER")
+    else:
+        set_format(settings, "IMAGE", "OPEN_EXR")
     settings.color_mode = "RGBA"
     settings.color_depth = "32"
     settings.exr_codec = "NONE"  # files that are read again at once; packing takes longer
-    settings.use_exr_interleave = False  # one part of all layers, as files before Blender 5 have it
+    if FIVE:
+        settings.use_exr_interleave = False  # one part of all layers, as before
     settings.color_management = "FOLLOW_SCENE"
 
 

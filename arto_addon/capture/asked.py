@@ -21,6 +21,7 @@ from ...core.hemicube import Hemicube
 from ...core.patterns import pattern_set
 from ...core.region import Region
 from ...core.shot import Shot
+from ..blender.colour import working_space
 from ..shot import home
 from ..shot.fingerprint import fingerprint, key_of
 from ..shot.shot import shot_of
@@ -97,7 +98,7 @@ def asked(
             "adaptive": settings.adaptive,
             "far": settings.far,
             "blender": bpy.app.version_string,
-            "colour_space": bpy.data.colorspace.working_space,
+            "colour_space": working_space(),
             "film_transparent": scene.render.film_transparent,
             "changed": on.changed,
         }

@@ -17,7 +17,7 @@ from ...core.agreement import Agreement, agreement
 from ...core.environment import Environment, directions, sample_directions
 from ...core.hemicube import Hemicube
 from ...core.patterns import pattern_set
-from ..blender.nodes import trees
+from ..blender.nodes import shader_tree, trees
 from ..stage.small import parts_of, small
 from ..stage.stage import Stage
 from ..work import Progress, Steps
@@ -145,6 +145,6 @@ def _cause(on: Stage) -> str:
 def _asks_for_shadow_rays(material: Any) -> bool:
     return any(
         node.bl_idname == "ShaderNodeLightPath" and node.outputs["Is Shadow Ray"].is_linked
-        for tree in trees(material.node_tree, set())
+        for tree in trees(shader_tree(material), set())
         for node in tree.nodes
     )

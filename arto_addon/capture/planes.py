@@ -15,7 +15,7 @@ import numpy as np
 from ...core.basis_images import GRAIN, GROUP, group_name
 from ...core.hemicube import FACE_NAMES, Hemicube
 from ...core.patterns import PatternSet, pattern_set
-from ..blender.nodes import Nodes
+from ..blender.nodes import Nodes, made_of_nodes, new_material
 from ..stage.stage import Stage, free_mark
 
 COLLECTION = "ARTO Hemicube"
@@ -109,7 +109,7 @@ def _shader(nodes: Nodes, radiance: Any) -> Any:
 
 def pattern_material(name: str, patterns: PatternSet, sampled: bool = False) -> Any:
     """Emission of a pattern of the set (or of `GRAIN`), plus what lies behind."""
-    material = bpy.data.materials.new(f"ARTO {name}")
+    material = new_material(f"ARTO {name}")
     # paths find the patches; no shadow ray is ever cast at them, so Cycles' limit of 255 light
     # groups for sampled lights does not apply
     material.cycles.emission_sampling = "FRONT_BACK" if sampled else "NONE"
@@ -130,7 +130,7 @@ def overriding_material(
     """
     material = override.copy()
     material.cycles.emission_sampling = "FRONT_BACK" if sampled else "NONE"  # as above
-    tree = material.node_tree
+    tree = made_of_nodes(material)
     nodes = Nodes(tree)
     number = tree.nodes.new("ShaderNodeAttribute")
     number.attribute_type, number.attribute_name = "OBJECT", PATTERN

@@ -22,6 +22,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import ArtoError, CancelledError, SceneError
+from ..blender.compositing import places_of_groups
 from ..capture.capture import capture
 from ..capture.sequence import capture_frames
 from ..fit import fit
@@ -120,7 +121,7 @@ def _turn_paths(folder: Path) -> None:
     trees = [
         t for m in (*bpy.data.materials, *bpy.data.worlds, *bpy.data.lights) if (t := m.node_tree)
     ]
-    owners: list[Any] = [n for tree in (*trees, *bpy.data.node_groups) for n in tree.nodes]
+    owners: list[Any] = [n for tree in (*trees, *places_of_groups()) for n in tree.nodes]
     owners += [m for o in bpy.data.objects for m in o.modifiers]
     for owner in owners:
         for prop in owner.bl_rna.properties:

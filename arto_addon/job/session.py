@@ -22,6 +22,7 @@ from bpy.app.handlers import persistent
 
 from ...core.errors import BusyError, SceneError
 from ...core.files import Lock
+from ..blender.quitting import not_when_quitting, when_quitting
 from ..shot import paths, watch
 from ..shot.shot import shot_of
 from . import snapshot
@@ -299,12 +300,11 @@ def _quitting(*_: object) -> None:
 
 def register() -> None:
     if not bpy.app.background:  # without a window there is no job to end
-        bpy.app.handlers.exit_pre.append(_quitting)
+        when_quitting(_quitting)
 
 
 def unregister() -> None:
-    if _quitting in bpy.app.handlers.exit_pre:
-        bpy.app.handlers.exit_pre.remove(_quitting)
+    not_when_quitting(_quitting)
     end()
     if bpy.app.timers.is_registered(_follow):
         bpy.app.timers.unregister(_follow)

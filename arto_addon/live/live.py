@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ...core import exr
 from ...core.errors import ArtoError, SceneError
 from ...core.preview import Preview
+from ..blender.colour import working_space
 from ..job import session, snapshot
 from ..relight.light_key import HEADER, light_key
 from ..relight.own import gains_of
@@ -205,7 +206,7 @@ def push(picture: NDArray[np.float32], name: str) -> bpy.types.Image:
         image = None
     if image is None:
         image = bpy.data.images.new(IMAGE, width, height, alpha=True, float_buffer=True)
-        image.colorspace_settings.name = bpy.data.colorspace.working_space
+        image.colorspace_settings.name = working_space()
         image.alpha_mode = "PREMUL"
         image.use_view_as_render = True
         image.use_fake_user = False

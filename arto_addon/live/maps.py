@@ -23,7 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import ArtoError, SceneError
-from ..blender.nodes import trees
+from ..blender.colour import work_in, working_space
+from ..blender.nodes import shader_tree, trees
 from ..job.snapshot import in_no_file, painted_pixels
 from ..shot import home, walk
 from ..world import kept
@@ -129,7 +130,7 @@ class Maps:
             width=scene.arto.environment_width if full else 0,
             frame=scene.frame_current,
             subframe=scene.frame_subframe,
-            space=bpy.data.colorspace.working_space,
+            space=working_space(),
             device=scene.cycles.device,
             painted=painted,
             folder=str(home.absolute(scene.arto.folder)),
@@ -179,7 +180,7 @@ class Maps:
 
 def images(world: bpy.types.World) -> list[bpy.types.Image]:
     """The images of a world's nodes."""
-    found = [n for t in trees(world.node_tree, set()) for n in t.nodes]
+    found = [n for t in trees(shader_tree(world), set()) for n in t.nodes]
     return [n.image for n in found if getattr(n, "image", None)]
 
 
@@ -207,8 +208,7 @@ def serve() -> int:
 
 def _made(asked: Asked) -> str:
     scene = bpy.context.scene
-    if bpy.data.colorspace.working_space != asked.space:
-        bpy.ops.wm.set_working_color_space(working_space=asked.space, convert_colors=False)
+    work_in(asked.space)
     scene.frame_set(asked.frame, subframe=asked.subframe)
     scene.cycles.device = asked.device
     scene.arto.folder = asked.folder

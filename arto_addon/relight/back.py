@@ -14,6 +14,9 @@ from ...core import exr
 from ...core.errors import SceneError
 from ...core.layers import part_of
 from ...core.shot import safe_name
+from ..blender.colour import working_space
+from ..blender.compositing import compositor
+from ..blender.nodes import new_world
 from ..shot import paths
 from ..shot.shot import layer_of
 from ..world import kept
@@ -45,7 +48,7 @@ class Mix:
 def mix_of(scene: bpy.types.Scene) -> Mix:
     """The mix in the scene's compositor. Raises SceneError where there is none, or where something
     is linked to its sockets, which a lamp cannot follow."""
-    tree = scene.compositing_node_group
+    tree = compositor(scene)
     for node in tree.nodes if tree else ():
         group = getattr(node, "node_tree", None)
         if group is None or SOURCE not in group.nodes:
@@ -89,7 +92,7 @@ def mix_to_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> Path:
     # light from where no patch is: seen, though it lights nothing
     image += whole.image * np.maximum(left, 0)[..., None] * np.float32(2.0**mix.exposure)
     path = world_file(path)
-    exr.write(path, {"": image}, None, bpy.data.colorspace.working_space)
+    exr.write(path, {"": image}, None, working_space())
     _gain_lamps(scene, mix)
     scene.world = _world_of(path, whole.turn)
     scene.view_layers[layer].world_override = None
@@ -136,12 +139,12 @@ def _gain_lamps(scene: bpy.types.Scene, mix: Mix) -> None:
 
 def _world_of(path: Path, turn: float) -> bpy.types.World:
     """A world that shows a map, turned."""
-    world = bpy.data.worlds.get(WORLD) or bpy.data.worlds.new(WORLD)
+    world = bpy.data.worlds.get(WORLD) or new_world(WORLD)
     tree = world.node_tree
     tree.nodes.clear()
     image = bpy.data.images.load(str(path), check_existing=True)
     image.reload()
-    image.colorspace_settings.name = bpy.data.colorspace.working_space
+    image.colorspace_settings.name = working_space()
     texture = tree.nodes.new("ShaderNodeTexEnvironment")
     texture.image = image
     light, out = tree.nodes.new("ShaderNodeBackground"), tree.nodes.new("ShaderNodeOutputWorld")

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...core import exr
 from ...core.errors import SceneError
+from ..blender.colour import working_space
 from ..shot import paths
 
 IMAGE = "ARTO Compare"
@@ -71,7 +72,7 @@ def update(scene: bpy.types.Scene) -> bpy.types.Image | None:
     height, width = out.shape[:2]
     if image is None:
         image = bpy.data.images.new(IMAGE, width, height, alpha=True, float_buffer=True)
-        image.colorspace_settings.name = bpy.data.colorspace.working_space
+        image.colorspace_settings.name = working_space()
         image.alpha_mode = "PREMUL"
         image.use_view_as_render = True
     elif tuple(image.size) != (width, height):

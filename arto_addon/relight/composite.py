@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import SceneError
+from ..blender.colour import working_space
 from ..blender.compositing import OUTPUT, composited, compositor, own_compositor
 from ..shot import paths
 from ..work import Progress, Steps
@@ -43,7 +44,7 @@ def save_composite(scene: bpy.types.Scene, view_layer: str) -> Steps:
     height, width = picture.shape[:2]
     image = bpy.data.images.new(COMPOSITE, width, height, alpha=True, float_buffer=True)
     try:
-        image.colorspace_settings.name = bpy.data.colorspace.working_space
+        image.colorspace_settings.name = working_space()
         image.alpha_mode = "PREMUL"
         image.pixels.foreach_set(np.ascontiguousarray(picture[::-1]).ravel())
         image.save_render(str(path), scene=scene)

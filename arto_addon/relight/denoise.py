@@ -17,7 +17,8 @@ from ...core import exr
 from ...core.field import Field
 from ...core.field_writer import write_head
 from ...core.tile_writer import write_layer
-from ..blender.compositing import studio
+from ..blender.colour import working_space
+from ..blender.compositing import choose, studio
 from ..work import Progress, Steps
 from .plate import mixed
 
@@ -124,8 +125,8 @@ def denoise(
         for i, picture in enumerate(pictures):
             node = tree.nodes.new("CompositorNodeDenoise")
             node.inputs["HDR"].default_value = True
-            node.inputs["Prefilter"].default_value = "None" if clean else "Accurate"
-            noisy = source(f"picture{i}", picture, bpy.data.colorspace.working_space)
+            choose(node, "Prefilter", "None" if clean else "Accurate")
+            noisy = source(f"picture{i}", picture, working_space())
             for name, socket in {"Image": noisy, **steer}.items():
                 tree.links.new(socket, node.inputs[name])
             total = node.outputs[0] if total is None else mixed(tree, "ADD", total, node.outputs[0])

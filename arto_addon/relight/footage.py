@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import SceneError
-from ..blender.compositing import studio
+from ..blender.compositing import choose, compositor, studio, turned_off
 from ..stage.stage import picture_size
 
 # How a picture of another shape fills the frame, by the camera's word for it.
@@ -45,8 +45,8 @@ class Footage:
         """
         with studio("ARTO Footage") as on:
             scale = on.tree.nodes.new("CompositorNodeScale")
-            scale.inputs["Type"].default_value = "Render Size"
-            scale.inputs["Frame Type"].default_value = _FILLS[self.fills]
+            choose(scale, "Type", "Render Size")
+            choose(scale, "Frame Type", _FILLS[self.fills])
             on.tree.links.new(self._node(on.tree).outputs["Image"], scale.inputs["Image"])
             on.scene.render.fps, on.scene.render.fps_base = scene.render.fps, scene.render.fps_base
             on.scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
@@ -143,7 +143,7 @@ def _behind_camera(scene: bpy.types.Scene) -> Footage | None:
 
 
 def _in_compositor(scene: bpy.types.Scene) -> Footage | None:
-    tree = scene.compositing_node_group
+    tree = None if turned_off(scene) else compositor(scene)
     for node in tree.nodes if tree else ():
         if node.bl_idname == "CompositorNodeMovieClip" and node.clip and not node.mute:
             return Footage(node.clip, None, "CROP")

@@ -14,6 +14,7 @@ import bpy
 from ...core.errors import CaptureSetError, SceneError
 from ...core.relight import together
 from ...core.shot import Shot, safe_name
+from ..blender.nodes import new_world, shader_tree
 from ..capture.sequence import frame_kept
 from ..shot import paths
 from ..shot.shot import check_same_shot, shot_of
@@ -162,7 +163,7 @@ def _world_of(file: Path) -> Iterator[Any]:
         except RuntimeError as e:
             raise SceneError(f"{file} cannot be read ({e}): choose an HDRI") from e
         made.append(image)
-        world = bpy.data.worlds.new(file.stem)
+        world = new_world(file.stem)
         made.append(world)
         nodes = world.node_tree.nodes
         texture = nodes.new("ShaderNodeTexEnvironment")
@@ -184,14 +185,15 @@ def turned(world: bpy.types.World, angle: float) -> Iterator[Any]:
         for block in (copy, copy.node_tree):
             if block:
                 block.animation_data_clear()
-        nodes = copy.node_tree.nodes
+        tree = shader_tree(copy)
+        nodes = tree.nodes if tree else ()
         textures = [n for n in nodes if n.bl_idname == "ShaderNodeTexEnvironment"]
         mappings = [n for n in nodes if n.bl_idname == "ShaderNodeMapping"]
         if len(textures) == 1 and not mappings and not textures[0].inputs["Vector"].is_linked:
             mapping = nodes.new("ShaderNodeMapping")
             source = nodes.new("ShaderNodeTexCoord")
-            copy.node_tree.links.new(source.outputs["Generated"], mapping.inputs["Vector"])
-            copy.node_tree.links.new(mapping.outputs[0], textures[0].inputs["Vector"])
+            tree.links.new(source.outputs["Generated"], mapping.inputs["Vector"])
+            tree.links.new(mapping.outputs[0], textures[0].inputs["Vector"])
         elif len(mappings) == 1 and not mappings[0].inputs["Rotation"].is_linked:
             mapping = mappings[0]
         else:

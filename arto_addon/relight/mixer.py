@@ -12,6 +12,7 @@ from typing import Any
 import bpy
 
 from ...core import exr
+from ..blender.compositing import choose, places_of_groups
 from .plate import add_footage, mixed, show
 
 EXPOSURE_SOCKET = "Exposure"
@@ -55,7 +56,7 @@ def _new(name: str) -> Any:
     exposure.inputs["Image"].default_value = _BLACK
     alpha = tree.nodes.new("CompositorNodeSetAlpha")
     alpha.name, alpha.location = ALPHA, (800, 0)
-    alpha.inputs["Type"].default_value = "Replace Alpha"
+    choose(alpha, "Type", "Replace Alpha")
     link = tree.links.new
     link(entry.outputs[EXPOSURE_SOCKET], exposure.inputs["Exposure"])
     link(exposure.outputs[0], alpha.inputs["Image"])
@@ -71,7 +72,7 @@ def _add(tree: Any, source: Any, layer: str) -> None:
     tint = tree.interface.new_socket(f"{layer} Tint", in_out="INPUT", socket_type="NodeSocketColor")
     tint.default_value = _WHITE
     # where the group is in use already, new sockets stand at nothing
-    for other in bpy.data.node_groups:
+    for other in places_of_groups():
         for node in other.nodes:
             if getattr(node, "node_tree", None) == tree:
                 node.inputs[layer].default_value = 1.0

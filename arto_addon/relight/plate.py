@@ -14,6 +14,7 @@ from ...core import cryptomatte, exr
 from ...core.errors import SceneError
 from ...core.exr_window import NO_HIT, Window
 from ...core.field import Field
+from ..blender.colour import working_space
 from ..shot import home, paths
 from .header import header
 
@@ -67,7 +68,7 @@ def shown_file(path: Path, header: dict[str, Any]) -> Path:
 def header_of(scene: bpy.types.Scene, about: dict[str, str]) -> tuple[dict[str, Any], str]:
     """A plate's header and colour space."""
     attributes = header(scene) | {f"arto.{k}": v for k, v in about.items()}
-    return attributes, bpy.data.colorspace.working_space
+    return attributes, working_space()
 
 
 def share_file(path: Path) -> Path:
@@ -151,7 +152,7 @@ def show(path: Path, name: str = IMAGE) -> bpy.types.Image:
     image.source = "FILE"
     image.filepath = relative
     image.reload()
-    image.colorspace_settings.name = bpy.data.colorspace.working_space
+    image.colorspace_settings.name = working_space()
     image.alpha_mode = "PREMUL"
     # the image editor shows it as it shows a render: exposure, AgX
     image.use_view_as_render = True

@@ -10,6 +10,7 @@ from typing import Any
 import bpy
 
 from ...core import exr
+from ..blender.compositing import add_output, compositor, new_compositor, turned_off
 from ..shot.shot import layer_of
 from .mixer import mixer
 from .plate import (
@@ -47,8 +48,10 @@ def present(scene: bpy.types.Scene, path: Path, look: str | None = None) -> bpy.
     if node is not None:
         use(scene)
     else:
-        tree = scene.compositing_node_group.name
+        tree = compositor(scene).name
         print(f"ARTO: the compositor '{tree}' is linked and stays as it is: add '{name}' to it")
+    if turned_off(scene):
+        print(f"ARTO: the scene's compositor is off: turn Use Nodes on in it to see '{name}'")
     if not bpy.app.background and bpy.context.window_manager.windows:
         bpy.ops.ed.undo_push(message="Relight")
     return image
@@ -83,16 +86,14 @@ def wire(scene: bpy.types.Scene, group: Any) -> Any:
     if it had none; a scene without a compositor gets one that passes its render on. A tree linked
     from a library is left alone (-> None): the plate's node group can be added where it is made.
     """
-    tree = scene.compositing_node_group
+    tree = compositor(scene)
     if tree is None:
-        tree = bpy.data.node_groups.new("ARTO Compositor", "CompositorNodeTree")
-        tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+        tree = new_compositor(scene, "ARTO Compositor")
         render = tree.nodes.new("CompositorNodeRLayers")
         render.scene = scene
-        out = tree.nodes.new("NodeGroupOutput")
+        out = add_output(tree)
         out.location = (500, 0)
         tree.links.new(render.outputs["Image"], out.inputs["Image"])
-        scene.compositing_node_group = tree
     if not tree.is_editable:
         return None  # a library's: an edit of it would be gone with the next save
     node = next(
@@ -118,7 +119,7 @@ def wire(scene: bpy.types.Scene, group: Any) -> Any:
 def use(scene: bpy.types.Scene) -> None:
     """Have the scene's compositor use the plate as its setting says: instead of the render that it
     is of, or in a viewer alone. The mixer comes before the plate where layers are written."""
-    tree = scene.compositing_node_group
+    tree = compositor(scene)
     if tree is None or not tree.is_editable:
         return
     name = name_of(scene)

@@ -10,6 +10,7 @@ import bpy
 from ...core.errors import CaptureSetError
 from ...core.region import Region
 from ...core.shot import Shot
+from ..blender.colour import working_space
 from ..stage.stage import picture_region, picture_size
 from . import home, scene_id
 
@@ -42,7 +43,7 @@ def shot_of(
         camera=camera.name if camera else "",
         subframe=round(scene.frame_subframe, 5),
         region=(region.x, region.y, region.width, region.height),
-        colour_space=bpy.data.colorspace.working_space,
+        colour_space=working_space(),
     )
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import bpy
 
+from ..blender.nodes import new_world
 from .stage import Stage
 
 
@@ -69,7 +70,7 @@ def prepare(on: Stage, layers: int) -> None:
     layer = on.scene.view_layers[0]
     layer.cycles.denoising_store_passes = True
     layer.use_pass_z = True
-    world = on.made(bpy.data.worlds.new("ARTO Black"))
+    world = on.made(new_world("ARTO Black"))
     world.node_tree.nodes.clear()
     on.changed["world"] = [on.scene.world.name if on.scene.world else None, None]
     on.scene.world = world

@@ -42,6 +42,11 @@ def _title(name: str) -> str:
     return name.replace("_", " ").title()
 
 
+# Made here: within an annotation a comprehension sees no name of this module before Python 3.12.
+_PATTERNS = [(n, *_PATTERN_TEXT.get(n, (_title(n), ""))) for n in PATTERN_SETS]
+_SUPPORTS = [(n, *_SUPPORT_TEXT.get(n, (_title(n), ""))) for n in CHOICES]
+
+
 def _preset_chosen(self: CaptureSettings, context: bpy.types.Context) -> None:
     if self.preset in PRESETS:
         self["faces"] = sum(1 << FACE_NAMES.index(f) for f in PRESETS[self.preset])
@@ -129,7 +134,7 @@ class CaptureSettings:
     patterns: EnumProperty(
         name="Patterns",
         description="What the patches show",
-        items=[(n, *_PATTERN_TEXT.get(n, (_title(n), ""))) for n in PATTERN_SETS],
+        items=_PATTERNS,
         default="linear",
     )
     route: EnumProperty(
@@ -196,7 +201,7 @@ class CaptureSettings:
     support: EnumProperty(
         name="Support",
         description="How the light within a patch is filtered",
-        items=[(n, *_SUPPORT_TEXT.get(n, (_title(n), ""))) for n in CHOICES],
+        items=_SUPPORTS,
         default="auto",
     )
     separate: BoolProperty(

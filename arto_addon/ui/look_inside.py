@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import ArtoError
+from ..blender.colour import working_space
 from ..live.live import IMAGE as LIVE
 from ..relight import compare, inside
 from ..relight.plate import name_of
@@ -28,7 +29,7 @@ def image_of(name: str, picture: NDArray[np.float32], display: bool = False) -> 
         image = None
     if image is None:
         image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=True)
-        image.colorspace_settings.name = bpy.data.colorspace.working_space
+        image.colorspace_settings.name = working_space()
         image.alpha_mode = "PREMUL"
         image.use_view_as_render = not display
     image.pixels.foreach_set(np.ascontiguousarray(picture[::-1], np.float32).ravel())

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...core import exr
 from ...core.region import Region
-from ..blender.nodes import trees
+from ..blender.nodes import shader_tree, trees
 from ..blender.output import float_exr, write_to
 from ..shot.shot import layer_of
 from ..stage.settings import prepare
@@ -100,7 +100,7 @@ def holds_out(scene: bpy.types.Scene, view_layer: str) -> bool:
     return any(o.is_holdout for o in bpy.data.objects) or any(
         node.bl_idname == "ShaderNodeHoldout"
         for material in bpy.data.materials
-        for tree in trees(material.node_tree, set())
+        for tree in trees(shader_tree(material), set())
         for node in tree.nodes
     )
 

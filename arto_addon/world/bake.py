@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...core.environment import Environment
 from ...core.region import Region
-from ..blender.nodes import Nodes, trees
+from ..blender.nodes import Nodes, new_material, shader_tree, trees
 from ..stage.stage import set_region
 from .check import check_world
 from .detail import detail
@@ -43,7 +43,7 @@ LEAST_WIDTH = 1024
 
 def _pass_through(made: list[Any], studio: Any) -> None:
     """The box around the camera: what it lets through is no longer a camera ray."""
-    material = bpy.data.materials.new("ARTO Pass Through")
+    material = new_material("ARTO Pass Through")
     tree = material.node_tree
     tree.nodes.clear()
     glass = tree.nodes.new("ShaderNodeBsdfRefraction")
@@ -72,7 +72,7 @@ def sees_the_camera(world: Any) -> bool:
     )
     return hidden or any(
         node.bl_idname == "ShaderNodeLightPath"
-        for tree in trees(world.node_tree, set())
+        for tree in trees(shader_tree(world), set())
         for node in tree.nodes
     )
 
@@ -81,7 +81,7 @@ def _by_area(world: Any) -> None:
     """Have a world shine by the cosine of the latitude, which is what a direction of an
     equirectangular map counts for: within a texel with a lamp in it, too, and beside a pole above
     all. (An even texel needs none of it, and would get the noise of it.)"""
-    tree = world.node_tree
+    tree = shader_tree(world)
     out = tree.get_output_node("CYCLES") if tree else None
     if out is None or not out.inputs["Surface"].is_linked:
         return

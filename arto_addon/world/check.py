@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import SceneError
-from ..blender.nodes import trees
+from ..blender.nodes import shader_tree, trees
 from ..shot.shot import layer_of
 
 
@@ -33,7 +33,7 @@ def check_world(scene: bpy.types.Scene, view_layer: str | None = None) -> bpy.ty
             "it on (View Layer properties, Filter)"
         )
     check_no_volume(world)
-    for tree in trees(world.node_tree, set()):
+    for tree in trees(shader_tree(world), set()):
         for node in tree.nodes:
             if node.bl_idname not in {"ShaderNodeTexEnvironment", "ShaderNodeTexImage"}:
                 continue
@@ -69,7 +69,8 @@ def _fills(socket: bpy.types.NodeSocket) -> bool:
 
 def check_no_volume(world: bpy.types.World) -> None:
     """Raise SceneError for a world filled with fog: it swallows light from afar, an HDRI's too."""
-    out = world.node_tree.get_output_node("CYCLES") if world.node_tree else None
+    tree = shader_tree(world)
+    out = tree.get_output_node("CYCLES") if tree else None
     if out and _fills(out.inputs["Volume"]):
         raise SceneError(
             "the world has a volume, which swallows all light from afar: put the fog into an "
@@ -92,7 +93,7 @@ def differs_by_rays(world: bpy.types.World) -> str:
     if 0 < len(seen) < len(_KINDS):
         hidden = " and ".join(k for k in _KINDS if k not in seen)
         return f"hidden from {hidden} rays: all rays see it alike here"
-    for tree in trees(world.node_tree, set()):
+    for tree in trees(shader_tree(world), set()):
         for node in tree.nodes:
             if node.bl_idname != "ShaderNodeLightPath":
                 continue

@@ -10,7 +10,7 @@ from typing import Any
 
 import bpy
 
-from ..blender.nodes import trees
+from ..blender.nodes import shader_tree, trees, world_of_nodes
 
 # The nodes that are put in.
 TURN, STRENGTH, TINT, PLACE = "ARTO Turn", "ARTO Strength", "ARTO Tint", "ARTO Place"
@@ -19,7 +19,7 @@ _PICTURES = {"ShaderNodeTexEnvironment", "ShaderNodeTexSky"}
 
 
 def _top(world: bpy.types.World) -> Any:
-    return world.node_tree if world.node_tree and world.use_nodes else None
+    return shader_tree(world)
 
 
 def backgrounds(world: bpy.types.World) -> list[Any]:
@@ -54,7 +54,7 @@ def why_not_turned(world: bpy.types.World) -> str:
         return "The world is linked from a library: make it local to change it"
     if not _pictures(world):
         hidden = any(
-            n.bl_idname in _PICTURES for t in trees(world.node_tree, set()) for n in t.nodes
+            n.bl_idname in _PICTURES for t in trees(shader_tree(world), set()) for n in t.nodes
         )
         if hidden:
             return "The HDRI is in a node group: turn it there"
@@ -128,6 +128,8 @@ def strength(world: bpy.types.World) -> float:
 def set_strength(world: bpy.types.World, value: float) -> None:
     """Set how bright a world is; of one with many backgrounds, or a strength that is worked out, a
     factor on all of them."""
+    if not world.library:
+        world_of_nodes(world)
     if world.library or not backgrounds(world):
         return
     socket = _strength_socket(world)
@@ -164,6 +166,8 @@ def tint(world: bpy.types.World) -> tuple[float, float, float]:
 
 def set_tint(world: bpy.types.World, colour: Any) -> None:
     """Set the colour that a world's light is multiplied by."""
+    if not world.library:
+        world_of_nodes(world)
     if world.library or not backgrounds(world):
         return
     tree = world.node_tree
@@ -212,7 +216,7 @@ def set_hdri(world: bpy.types.World, image: bpy.types.Image) -> None:
     if nodes:
         nodes[0].image = image
         return
-    tree = world.node_tree
+    tree = world_of_nodes(world)
     texture = tree.nodes.new("ShaderNodeTexEnvironment")
     texture.image = image
     found = backgrounds(world)

@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from ..blender.nodes import trees
+from ..blender.nodes import shader_tree, trees
 
 # The width of a map in which a lamp of a tenth of a degree is two texels wide. What nodes draw may
 # be as fine as that, and what is finer is not looked for.
@@ -112,7 +112,7 @@ def detail(world: bpy.types.World) -> int:
     """
     widest = 1
     textures = {"ShaderNodeTexEnvironment", "ShaderNodeTexSky"}
-    for tree in trees(world.node_tree, set()):
+    for tree in trees(shader_tree(world), set()):
         for node in tree.nodes:
             kind = node.bl_idname
             if node.outputs and not any(s.is_linked for s in node.outputs):

@@ -13,6 +13,7 @@ from typing import Any
 
 import bpy
 
+from ..blender.nodes import shader_tree
 from .detail import values_only
 
 
@@ -40,7 +41,8 @@ def without_dials(world: bpy.types.World) -> Iterator[tuple[Any, float, float]]:
 def dials(world: bpy.types.World) -> tuple[Any, Any]:
     """The background node whose strength is that of all the world, and the mapping node that turns
     it; None where there is no such one."""
-    out = world.node_tree.get_output_node("CYCLES") if world.node_tree else None
+    tree = shader_tree(world)
+    out = tree.get_output_node("CYCLES") if tree else None
     links = out.inputs["Surface"].links if out else ()
     if not links or links[0].is_muted:
         return None, None
@@ -48,10 +50,10 @@ def dials(world: bpy.types.World) -> tuple[Any, Any]:
     if background.bl_idname != "ShaderNodeBackground" or background.mute:
         return None, None
     dial = None if background.inputs["Strength"].is_linked else background
-    nodes = [n for n in world.node_tree.nodes if not n.mute]
+    nodes = [n for n in tree.nodes if not n.mute]
     textures = [n for n in nodes if n.bl_idname == "ShaderNodeTexEnvironment"]
     mappings = [n for n in nodes if n.bl_idname == "ShaderNodeMapping"]
-    if len(textures) != 1 or len(mappings) != 1 or len(nodes) != len(world.node_tree.nodes):
+    if len(textures) != 1 or len(mappings) != 1 or len(nodes) != len(tree.nodes):
         return dial, None
     texture, mapping = textures[0], mappings[0]
     into, source = texture.inputs["Vector"].links, mapping.inputs["Vector"].links

@@ -19,7 +19,8 @@ import numpy as np
 from ...core.environment import Environment
 from ...core.errors import SceneError
 from ...core.files import whole
-from ..blender.nodes import trees
+from ..blender.colour import working_space
+from ..blender.nodes import shader_tree, trees
 from ..shot import paths
 from ..shot.fingerprint import of_blocks
 from .bake import bake
@@ -71,7 +72,7 @@ def painted(
     has not one HDRI alone.
     """
     with without_dials(world) as (plain, _, _):
-        found = [n for t in trees(plain.node_tree, set()) for n in t.nodes]
+        found = [n for t in trees(shader_tree(plain), set()) for n in t.nodes]
         textures = [n for n in found if n.bl_idname == "ShaderNodeTexEnvironment" and n.image]
         if len(textures) != 1 or textures[0].id_data != plain.node_tree:
             raise SceneError(
@@ -109,7 +110,7 @@ def _write(path: Path, image: np.ndarray) -> None:
 
 def _key(scene: bpy.types.Scene, world: bpy.types.World, width: int) -> str:
     """What a map hangs on, in sixteen letters."""
-    of: list[Any] = [VERSION, width, bpy.app.version_string, bpy.data.colorspace.working_space]
+    of: list[Any] = [VERSION, width, bpy.app.version_string, working_space()]
     # a copy of the world has another name
     found = of_blocks([world])
     of.append(sorted(("World" if k.startswith("World") else k, v) for k, v in found.items()))
@@ -124,7 +125,7 @@ def moving_images(world: bpy.types.World) -> bool:
         node.bl_idname == "ShaderNodeTexEnvironment"
         and node.image
         and node.image.source in {"SEQUENCE", "MOVIE"}
-        for tree in trees(world.node_tree, set())
+        for tree in trees(shader_tree(world), set())
         for node in tree.nodes
     )
 

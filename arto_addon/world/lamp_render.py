@@ -19,6 +19,8 @@ from ...core.environment import Environment
 from ...core.errors import SceneError
 from ...core.field import Field
 from ...core.region import Region
+from ..blender.colour import working_space
+from ..blender.nodes import new_world
 from ..stage.bounds import rendered
 from ..stage.settings import prepare
 from ..stage.small import parts_of, small
@@ -33,12 +35,12 @@ def world_of(on: Stage, shown: Environment, group: str = "") -> Any:
     image = on.made(
         bpy.data.images.new("ARTO Lamps", width, height, alpha=False, float_buffer=True)
     )
-    image.colorspace_settings.name = bpy.data.colorspace.working_space
+    image.colorspace_settings.name = working_space()
     rgba = np.ones((height, width, 4), np.float32)
     rgba[..., :3] = shown.image[::-1]
     image.pixels.foreach_set(rgba.ravel())
     image.update()
-    world = on.made(bpy.data.worlds.new("ARTO Lamps"))
+    world = on.made(new_world("ARTO Lamps"))
     nodes = world.node_tree.nodes
     texture = nodes.new("ShaderNodeTexEnvironment")
     texture.image = image

@@ -265,7 +265,7 @@ def test_bad_scenes(scene):
     with pytest.raises(SceneError, match="no camera"):
         captured(scene)
     scene.camera = camera
-    scene.render.engine = "BLENDER_EEVEE"
+    scene.render.engine = "BLENDER_WORKBENCH"
     with pytest.raises(SceneError, match="Cycles"):
         captured(scene)
     scene.render.engine = "CYCLES"

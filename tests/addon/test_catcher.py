@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from arto.arto_addon import fit, work
+from arto.arto_addon.blender.colour import working_space
 from arto.arto_addon.blender.output import float_exr
 from arto.arto_addon.capture import capture, room
 from arto.arto_addon.capture.sequence import capture_frames
@@ -273,7 +274,7 @@ def test_the_setting_goes_before_the_camera_and_a_moved_background_is_said(tmp_p
     grey = bpy.data.images.new("Grey", 48, 36, float_buffer=True)
     grey.pixels.foreach_set(np.full(48 * 36 * 4, 0.5, np.float32))
     grey.pack()
-    grey.colorspace_settings.name = bpy.data.colorspace.working_space
+    grey.colorspace_settings.name = working_space()
     scene.arto.footage = grey
     picture, share = relit(scene)
     comp = exr.read(plate.comp_file(paths.relit_file(scene)))[""]
@@ -375,7 +376,7 @@ def test_light_can_be_added_instead(tmp_path):
     light = PatchLight(kept.environment(scene, scene.arto.environment_width), shown.field.hemicube)
     whole, ground, _ = shown.pictures([light])[0]
     grey = bpy.data.images.new("Ground", 24, 18, float_buffer=True)
-    grey.colorspace_settings.name = bpy.data.colorspace.working_space
+    grey.colorspace_settings.name = working_space()
     rgba = np.dstack([ground[..., :3], np.ones(ground.shape[:2])]).astype(np.float32)
     grey.pixels.foreach_set(rgba[::-1].ravel())
     grey.pack()

@@ -7,6 +7,7 @@ import math
 import bpy
 import numpy as np
 import pytest
+from arto.arto_addon.blender.nodes import new_material
 from arto.arto_addon.capture import planes
 from arto.arto_addon.stage.bounds import scene_bounds
 from arto.arto_addon.stage.stage import stage
@@ -142,7 +143,7 @@ def test_patch_shows_its_pattern(scene, tmp_path):
     inside and v up: what the shader shows is what `PatternSet.radiance` says."""
     only = only_a_box(scene)
     bpy.data.objects.remove(only)
-    mirror = bpy.data.materials.new("Mirror")
+    mirror = new_material("Mirror")
     shader = mirror.node_tree.nodes["Principled BSDF"]
     shader.inputs["Metallic"].default_value, shader.inputs["Roughness"].default_value = 1, 0
     shader.inputs["Base Color"].default_value = (1, 1, 1, 1)

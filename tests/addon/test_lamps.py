@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 import pytest
 from arto.arto_addon import fit, work
+from arto.arto_addon.blender.nodes import new_world
 from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import paths
 from arto.arto_addon.stage import small
@@ -122,7 +123,7 @@ def test_the_scene_stays_as_it_is(shot):
 
 def test_a_world_without_lamps_needs_no_render(shot):
     kept = shot.world
-    shot.world = bpy.data.worlds.new("Even")
+    shot.world = new_world("Even")
     steps = []
     try:
         work.run(relight.relight(shot), steps.append)

@@ -9,6 +9,10 @@ import numpy as np
 import OpenImageIO
 import pytest
 from arto.arto_addon import work
+from arto.arto_addon.blender.compositing import add_output, compositor, new_compositor
+from arto.arto_addon.blender.nodes import new_world
+from arto.arto_addon.blender.output import set_format
+from arto.arto_addon.blender.version import FIVE
 from arto.arto_addon.relight import plate, relight
 from arto.arto_addon.relight.back import mix_to_scene
 from arto.arto_addon.relight.many import relight_many
@@ -94,11 +98,11 @@ def test_a_group_that_is_painted_on_the_hdri(lit):
     white.pack()
     lit.arto.groups.add().name = "window"
     lit.arto.groups[0].mask = white
-    lit.world = bpy.data.worlds.new("Sky")
+    lit.world = new_world("Sky")
     hdri(lit, image, rotation=0.9)
     picture, found = relit(lit)
     np.testing.assert_allclose(sum(found.values()), picture[..., :3], rtol=1e-5, atol=1e-6)
-    lit.world = bpy.data.worlds.new("Painted")
+    lit.world = new_world("Painted")
     hdri(lit, image * mask[..., None], rotation=0.9)
     lit.arto.layers = "OFF"
     path, _ = work.run(relight.relight(lit))
@@ -106,7 +110,7 @@ def test_a_group_that_is_painted_on_the_hdri(lit):
     assert alone.mean() > 0.01
     assert np.abs(found["LG_window"] - alone).mean() < 0.03 * alone.mean()
     # a world of no HDRI cannot be painted on
-    lit.world = bpy.data.worlds.new("Plain")
+    lit.world = new_world("Plain")
     lit.arto.layers = "GROUPS"
     with pytest.raises(SceneError, match="painted"):
         relit(lit)
@@ -277,7 +281,7 @@ def test_a_mix_goes_back_to_the_scene(tmp_path):
     hdri(scene, smooth(), rotation=0.4)
     captured(scene)
     _, found = relit(scene)
-    node = next(n for n in scene.compositing_node_group.nodes if "LG_key" in n.inputs)
+    node = next(n for n in compositor(scene).nodes if "LG_key" in n.inputs)
     gains = {"key": (3.0, (1, 0.5, 0.25)), "rest": (0.2, (1, 1, 1)), "own_Rim": (2.0, (0, 1, 0))}
     mixed = sum(found.values())
     for name, (gain, tint) in gains.items():
@@ -294,8 +298,9 @@ def test_a_mix_goes_back_to_the_scene(tmp_path):
         mix_to_scene(scene)
     assert [lamp.data.energy for lamp in lamps] == energies
     node.inputs["LG_key"].default_value = 1.0
-    link = scene.compositing_node_group.nodes.new("ShaderNodeValue")
-    scene.compositing_node_group.links.new(link.outputs[0], node.inputs["LG_key"])
+    tree = compositor(scene)
+    link = tree.nodes.new("ShaderNodeValue")
+    tree.links.new(link.outputs[0], node.inputs["LG_key"])
     with pytest.raises(SceneError, match="linked"):
         mix_to_scene(scene)
 
@@ -358,15 +363,13 @@ def relit_alpha(scene):
 def test_instead_of_the_render_and_back(lit):
     """What hung on the render hangs on the plate, or on the mixer where there are layers; back, it
     hangs where it did, but for what the artist has linked otherwise since."""
-    tree = bpy.data.node_groups.new("Mine", "CompositorNodeTree")
-    tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
-    render, out = tree.nodes.new("CompositorNodeRLayers"), tree.nodes.new("NodeGroupOutput")
+    tree = new_compositor(lit, "Mine")
+    render, out = tree.nodes.new("CompositorNodeRLayers"), add_output(tree)
     blur, glare = tree.nodes.new("CompositorNodeBlur"), tree.nodes.new("CompositorNodeGlare")
     render.scene = lit
     tree.links.new(render.outputs["Image"], blur.inputs["Image"])
     tree.links.new(render.outputs["Image"], glare.inputs["Image"])
     tree.links.new(blur.outputs["Image"], out.inputs[0])
-    lit.compositing_node_group = tree
 
     def comes_from(node):
         return node.inputs["Image"].links[0].from_node
@@ -387,13 +390,14 @@ def test_instead_of_the_render_and_back(lit):
     assert comes_from(out.inputs[0].links[0].from_node) == render
 
 
-@pytest.mark.parametrize("interleaved", [True, False])
+@pytest.mark.parametrize("interleaved", [True, False] if FIVE else [None])
 def test_cryptomattes_are_handed_on(lit, tmp_path, interleaved):
     """Every rank, bit for bit, and the names: from a file of the artist's own render."""
     lit.view_layers[0].use_pass_cryptomatte_object = True
     settings, rendered = lit.render.image_settings, tmp_path / "mine.exr"
-    settings.media_type, settings.file_format = "MULTI_LAYER_IMAGE", "OPEN_EXR_MULTILAYER"
-    settings.use_exr_interleave = interleaved
+    set_format(settings, "MULTI_LAYER_IMAGE", "OPEN_EXR_MULTILAYER")
+    if interleaved is not None:
+        settings.use_exr_interleave = interleaved
     lit.render.filepath, lit.cycles.samples = str(rendered), 4
     bpy.ops.render.render(write_still=True)
     lit.arto.write_data, lit.arto.cryptomatte = True, str(rendered)

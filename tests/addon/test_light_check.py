@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 import pytest
 from arto.arto_addon import fit, work
+from arto.arto_addon.blender.nodes import new_material
 from arto.arto_addon.capture import planes
 from arto.arto_addon.capture.light_check import check_light
 from arto.arto_addon.relight import relight
@@ -52,7 +53,7 @@ def room(tmp_path):
 
 def architects_glass():
     """Clear to shadow rays, glass to all others: the trick of every archviz scene."""
-    glass = bpy.data.materials.new("Architect's Glass")
+    glass = new_material("Architect's Glass")
     tree = glass.node_tree
     tree.nodes.clear()
     kinds = ("LightPath", "BsdfGlass", "BsdfTransparent", "MixShader", "OutputMaterial")

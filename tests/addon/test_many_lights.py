@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from arto.arto_addon import fit, work
+from arto.arto_addon.blender.compositing import OUTPUT, compositor
 from arto.arto_addon.capture.sequence import capture_frames
 from arto.arto_addon.relight import many, relight
 from arto.arto_addon.shot import paths
@@ -213,9 +214,9 @@ def test_frames_are_a_sequence_in_the_compositor(scene):
     node = bpy.data.node_groups["ARTO Relit Frames"].nodes["ARTO Relit"]
     assert (node.frame_start, node.frame_duration, node.frame_offset) == (5, 3, 4)
     # what the compositor shows
-    tree = scene.compositing_node_group
+    tree = compositor(scene)
     group = next(n for n in tree.nodes if n.label == "ARTO Relit Frames")
-    out = next(n for n in tree.nodes if n.bl_idname == "NodeGroupOutput")
+    out = next(n for n in tree.nodes if n.bl_idname == OUTPUT)
     tree.links.new(group.outputs["Image"], out.inputs[0])
     from arto.arto_addon.blender.output import float_exr
 

@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 import pytest
 from arto.arto_addon import fit, work
+from arto.arto_addon.blender.nodes import new_world
 from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import scene_id
 from arto.core import exr
@@ -37,7 +38,7 @@ def test_an_old_file_is_what_cycles_renders(tmp_path, name):
     scene.render.resolution_percentage = 100
     scene.camera.data.lens *= 2  # the torus is thin
     scene.render.film_transparent = True
-    scene.world = bpy.data.worlds.new("HDRI")
+    scene.world = new_world("HDRI")
     hdri(scene, smooth(), rotation=0.5)
     scene_id.give(scene)
     settings = scene.arto

@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 import pytest
 from arto.arto_addon import work
+from arto.arto_addon.blender.nodes import new_world
 from arto.arto_addon.relight import relight
 from arto.arto_addon.world.background import background
 from arto.arto_addon.world.bake import bake
@@ -15,7 +16,7 @@ from test_relight import run_all
 
 
 def world_of_colour(colour):
-    world = bpy.data.worlds.new("Other")
+    world = new_world("Other")
     world.node_tree.nodes["Background"].inputs["Color"].default_value = (*colour, 1)
     return world
 

@@ -7,6 +7,7 @@ import math
 import bpy
 import numpy as np
 import pytest
+from arto.arto_addon.blender.nodes import new_material
 from scene_tools import BOX, add_mesh, captured, cycles, set_colour, small_scene
 
 SAMPLES = 256
@@ -18,7 +19,7 @@ def looked_at(folder, degrees: float, shader: dict, through: bool):
     for thing in list(scene.objects):
         if thing.type == "MESH":
             bpy.data.objects.remove(thing)
-    material = bpy.data.materials.new("Slab")
+    material = new_material("Slab")
     for name, value in shader.items():
         material.node_tree.nodes["Principled BSDF"].inputs[name].default_value = value
     slab = add_mesh(scene, "Slab", *BOX, material)

@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from arto.arto_addon import fit, work
+from arto.arto_addon.blender.compositing import add_output, compositor, new_compositor
 from arto.arto_addon.relight import denoise, plate, relight
 from arto.arto_addon.shot import paths
 from arto.arto_addon.world.bake import bake
@@ -128,14 +129,14 @@ def test_image_file_and_compositor(tmp_path):
     assert image.colorspace_settings.name == "Linear Rec.709"
     pixels = np.array(image.pixels[:]).reshape(*picture.shape)[::-1]
     np.testing.assert_allclose(pixels, picture, atol=1e-6)
-    tree = scene.compositing_node_group
+    tree = compositor(scene)
     nodes = [n for n in tree.nodes if n.bl_idname == "CompositorNodeGroup"]
     assert [n.node_tree.name for n in nodes] == ["ARTO Relit"]
     # again: the same image, the same node
     count = len(tree.nodes)
     set_colour(scene, (0.9, 0.1, 0.1))
     bpy.ops.arto.relight()
-    assert scene.compositing_node_group == tree and len(tree.nodes) == count
+    assert compositor(scene) == tree and len(tree.nodes) == count
     assert len([i for i in bpy.data.images if i.name.startswith("ARTO")]) == 1
     again = np.array(bpy.data.images["ARTO Relit"].pixels[:]).reshape(*picture.shape)[::-1]
     np.testing.assert_allclose(again, exr.read(path)[""], atol=1e-6)
@@ -144,16 +145,14 @@ def test_image_file_and_compositor(tmp_path):
 
 def test_compositor_of_the_artist_is_left_as_it_is(tmp_path):
     scene = small_scene(tmp_path)
-    tree = bpy.data.node_groups.new("Mine", "CompositorNodeTree")
-    tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+    tree = new_compositor(scene, "Mine")
     render = tree.nodes.new("CompositorNodeRLayers")
     blur = tree.nodes.new("CompositorNodeBlur")
-    out = tree.nodes.new("NodeGroupOutput")
+    out = add_output(tree)
     viewer = tree.nodes.new("CompositorNodeViewer")
     tree.links.new(render.outputs["Image"], blur.inputs["Image"])
     tree.links.new(blur.outputs[0], out.inputs[0])
     tree.links.new(blur.outputs[0], viewer.inputs["Image"])
-    scene.compositing_node_group = tree
 
     def links():
         return {(i.from_node.name, i.to_node.name, i.to_socket.name) for i in tree.links}
