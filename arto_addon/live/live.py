@@ -21,6 +21,7 @@ from ...core import exr
 from ...core.errors import ArtoError, SceneError
 from ...core.preview import Preview
 from ..blender.colour import working_space
+from ..blender.quitting import not_when_quitting, when_quitting
 from ..job import session, snapshot
 from ..relight.light_key import HEADER, light_key
 from ..relight.own import gains_of
@@ -304,6 +305,15 @@ def _stop(*_: object) -> None:
 
 
 @persistent
+def _quitting(*_: object) -> None:
+    """End what is not of this process; of the file nothing matters any more."""
+    global current
+    if current is not None:
+        ended, current = current, None
+        ended.close()
+
+
+@persistent
 def _before_save(*_: object) -> None:
     if current is not None and not snapshot.taking:
         put_away(current.name)
@@ -314,7 +324,6 @@ _HANDLERS = {
     "depsgraph_update_post": _changed,
     "load_pre": _stop,
     "save_pre": _before_save,
-    "exit_pre": _stop,
 }
 
 
@@ -322,10 +331,12 @@ def register() -> None:
     if not bpy.app.background:
         for name, handler in _HANDLERS.items():
             getattr(bpy.app.handlers, name).append(handler)
+        when_quitting(_quitting)
 
 
 def unregister() -> None:
     stop()
+    not_when_quitting(_quitting)
     for name, handler in _HANDLERS.items():
         handlers = getattr(bpy.app.handlers, name)
         if handler in handlers:

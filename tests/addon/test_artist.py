@@ -220,7 +220,7 @@ def test_states_before_a_capture(tmp_path) -> None:
     found = state.told(scene)
     assert found.kind == "blocked" and "never saved" in found.lines[0]
     scene.arto.folder = str(tmp_path / "arto")
-    scene.render.engine = "BLENDER_EEVEE"
+    scene.render.engine = "BLENDER_WORKBENCH"
     assert state.told(scene).kind == "blocked"
     scene.render.engine = "CYCLES"
     captured(scene)
