@@ -11,6 +11,15 @@ from pathlib import Path
 def _demo(options: argparse.Namespace) -> None:
     from .demo import demo
 
+    if options.what == "looks":
+        from .looks_demo import looks_demo
+
+        size = (options.width, options.width * 3 // 4)
+        sheet = options.picture or options.out / "looks.png"
+        for name, seconds in looks_demo(sheet, size, options.samples, options.out).items():
+            print(f"{name}: {seconds:.1f} s")
+        print(f"look at {sheet}")
+        return
     if options.what == "plate":
         from .plate_demo import plate_demo, table
 
@@ -222,7 +231,7 @@ def main() -> int:
     commands = parser.add_subparsers(dest="command", required=True)
 
     c = commands.add_parser("demo", help="capture, fit, relight a scene; compare with Cycles")
-    c.add_argument("what", nargs="?", choices=("shot", "plate"), default="shot")
+    c.add_argument("what", nargs="?", choices=("shot", "plate", "looks"), default="shot")
     c.add_argument("--out", type=Path, default=Path("out/demo"))
     c.add_argument("--scene", default="product")
     c.add_argument("--hdri", default="courtyard")

@@ -67,7 +67,18 @@ class Walk:
             return
         time.sleep(1.0)  # software draws slowly
         path = self.folder / f"{self.number:02d}_{name}.png"
-        line = ["import", "-window", "root", "-resize", "1200x", "-colors", "96", f"png8:{path}"]
+        line = [
+            "import",
+            "-window",
+            "root",
+            "-resize",
+            "1200x",
+            "-dither",
+            "None",
+            "-colors",
+            "64",
+            f"png8:{path}",
+        ]
         subprocess.run(line, env={**os.environ, "DISPLAY": self.w.display}, check=True)
 
     def region(self, area: str, region: str) -> list[int]:

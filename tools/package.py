@@ -23,7 +23,9 @@ from pathlib import Path
 from .wheel_symbols import copy_symbolic
 
 ROOT = Path(__file__).resolve().parent.parent
-SHIPPED = ("__init__.py", "arto_addon", "core", "LICENSE", "README.md")
+SHIPPED = (
+    "__init__.py", "arto_addon", "core", "LICENSE", "README.md", "docs/guide.md", "docs/walk",
+)  # fmt: skip
 # Blender 4.5 runs the first, the official 5.2 the second, and Linux distributions build that with
 # the third. All wheels go into one zip: Blender unpacks the one of its own Python and platform, and
 # passes by the others.
@@ -96,6 +98,7 @@ def stage(folder: Path, targets: tuple[Target, ...]) -> None:
     (folder / "wheels").mkdir(parents=True)
     for name in SHIPPED:
         source = ROOT / name
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
         if source.is_dir():
             shutil.copytree(source, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
         elif source.is_file():
