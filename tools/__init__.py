@@ -1,1 +1,1 @@
-"""What makes the extension and its pictures: `tools.package` and `tools.screenshot`."""
+"""What makes the extension and its pictures: `tools.package`, `tools.walk`, `tools.screenshot`."""

@@ -1,9 +1,9 @@
-"""Picture of the extension in Blender's window: `python -m tools.screenshot docs/panel.png`, or of
-a shot with a shadow catcher and layers: `python -m tools.screenshot --plate docs/mixer.png`.
+"""Picture of a shot with a shadow catcher and layers, mixed in the compositor:
+`python -m tools.screenshot docs/mixer.png`. (Those of an artist's hour are of `tools.walk`.)
 
-Builds the extension, installs it into a Blender of no person's own, captures, fits and relights the
-product shot at few samples, and shows panel, relit picture and compositor. Needs Linux, xvfb-run,
-and BLENDER, the command line of the Blender executable.
+Builds the extension, installs it into a Blender of no person's own, captures and relights the shot
+at few samples, and shows its panel, the relit picture and the compositor. Needs Linux, xvfb-run,
+xdotool, and BLENDER, the command line of the Blender executable.
 """
 
 from __future__ import annotations
@@ -22,28 +22,12 @@ SCREEN = (1600, 900)
 
 # Blender's own screenshot is black on some displays: so the display itself is photographed.
 PHOTOGRAPH = """
+xdotool mousemove 5 895
 (until [ -e "$SHOT.ready" ]; do sleep 0.2; done; import -window root "$SHOT"; rm "$SHOT.ready") &
 "$@"
 code=$?
 kill $! 2>/dev/null
 exit $code
-"""
-
-WORK = """
-import sys
-sys.path.insert(0, sys.argv[-2])
-import bpy
-from bench import scenes, worlds
-
-scene = scenes.product_shot(width=400, height=300)
-worlds.set_world_hdri(scene, "sunset")
-bpy.ops.preferences.addon_enable(module="bl_ext.user_default.arto")
-bpy.ops.wm.save_as_mainfile(filepath=sys.argv[-1])
-bpy.ops.arto.build_hemicube()
-bpy.ops.arto.capture()
-bpy.ops.arto.fit()
-bpy.ops.arto.relight()
-bpy.ops.wm.save_mainfile()
 """
 
 PLATE = """
@@ -171,10 +155,8 @@ bpy.app.timers.register(step, first_interval=1.0)
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tools.screenshot")
     parser.add_argument("picture", type=Path, help="the PNG to write")
-    parser.add_argument("--plate", action="store_true", help="a shadow catcher, and layers")
     options = parser.parse_args()
-    picture, plate = options.picture.resolve(), options.plate
-    panels = "ARTO_PT_layers" if plate else "ARTO_PT_hemicube,ARTO_PT_capture"
+    picture, panels = options.picture.resolve(), "ARTO_PT_layers_render"
     blender = shlex.split(os.environ.get("BLENDER", ""))
     if not blender:
         print("screenshot: BLENDER is not set, the command line of Blender", file=sys.stderr)
@@ -193,7 +175,7 @@ def main() -> int:
 
         install = ("--command", "extension", "install-file", "-r", "user_default", "--enable")
         run(*blender, *install, zipped)
-        (folder / "work.py").write_text(PLATE if plate else WORK)
+        (folder / "work.py").write_text(PLATE)
         (folder / "show.py").write_text(SHOW)
         scene, work, shot = folder / "product.blend", folder / "work.py", folder / "shot.png"
         run(*blender, "-b", "--python-exit-code", "1", "--python", work, "--", package.ROOT, scene)

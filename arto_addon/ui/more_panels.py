@@ -78,6 +78,7 @@ class Layers(Draws):
         column.prop(settings, "write_data")
         if settings.write_data:
             column.prop(settings, "cryptomatte", text="")
+        say(column, context, "Data Window")
         column.prop(settings, "data_window", text="")
         column.prop(settings, "overscan")
 
