@@ -18,7 +18,7 @@ HDRIS = ("courtyard", "sunset", "night", "studio")
 
 
 def looks_demo(sheet: Path, size: tuple[int, int], samples: int, out: Path) -> dict[str, float]:
-    """Write the picture; returns seconds: of the capture and its first plate, of the four plates."""
+    """Write the picture; returns seconds, of the capture and of the four relights."""
     scene = scenes.product_shot(width=size[0], height=size[1])
     reference.registered()
     World(HDRIS[0]).apply(scene)

@@ -291,3 +291,58 @@ def test_an_hour_of_an_artist(walk: Walk, tmp_path: Path, program: Program) -> N
     done = program.run("-b", "--factory-startup", tmp_path / "old.blend")
     assert done.returncode == 0 and "Traceback" not in done.stdout + done.stderr, said(done)
     assert not np.isnan(red).any()
+
+
+EVERYWHERE = """
+import sys
+window = bpy.context.window_manager.windows[0]
+kinds = {"VIEW_3D": None, "IMAGE_EDITOR": "IMAGE_EDITOR", "NODE_EDITOR": "CompositorNodeTree"}
+areas = sorted((a for a in window.screen.areas if a.type in kinds), key=lambda a: a.x)
+areas[1].ui_type = "CompositorNodeTree"
+for area in areas:
+    area.spaces.active.show_region_ui = True
+"""
+TABS = """
+for area in bpy.context.window_manager.windows[0].screen.areas:
+    for region in area.regions:
+        if area.type in {"IMAGE_EDITOR", "NODE_EDITOR"} and region.type == "UI":
+            region.active_panel_category = "ARTO"
+"""
+LANGUAGE = """
+view = bpy.context.preferences.view
+view.language = {0!r}
+view.use_translate_interface = True
+for area in bpy.context.window_manager.windows[0].screen.areas:
+    area.tag_redraw()
+"""
+
+
+def test_panels_in_every_place_and_language(walk: Walk, tmp_path: Path, program: Program) -> None:
+    """Drawn without an error beside a picture, in the compositor and the render properties; and in
+    German and Japanese, of which pictures are taken."""
+    w = walk.w
+    w.do(ARRANGE)
+    time.sleep(0.5)
+    w.do(TAB)
+    w.do(BEGIN)
+    w.do("bpy.context.scene.arto.quality = 'DRAFT'; bpy.context.scene.arto.memory = 0")
+    w.do("bpy.ops.arto.shoot('INVOKE_DEFAULT')")
+    level, text = w.idle(240)
+    assert level == "INFO", text
+    walk.number = 20
+    for language in ("de_DE", "ja_JP"):
+        w.do(LANGUAGE.format(language))
+        found = w.get("bpy.app.translations.locale")
+        if found != language:
+            pytest.skip(f"this Blender speaks {found or 'English'} alone")
+        assert w.get("bpy.app.translations.pgettext_iface('No capture yet')") != "No capture yet"
+        walk.shot(language)
+    w.do(LANGUAGE.format("en_US"))
+    w.do(EVERYWHERE)
+    time.sleep(1.0)
+    w.do(TABS)
+    for _ in range(3):
+        w.do("[a.tag_redraw() for a in bpy.context.window_manager.windows[0].screen.areas]")
+        time.sleep(0.5)
+    walk.shot("beside_picture_and_nodes")
+    assert "Traceback" not in w.printed, w.printed
