@@ -329,7 +329,14 @@ def test_panels_in_every_place_and_language(walk: Walk, tmp_path: Path, program:
     w.do("bpy.ops.arto.shoot('INVOKE_DEFAULT')")
     level, text = w.idle(240)
     assert level == "INFO", text
-    walk.number = 20
+    w.do("bpy.context.window_manager.arto.overlay = True")
+    drawn = MODULE.format("ui.overlay")
+    w.wait(f"{drawn}.map_of(bpy.context.scene) is not None", 40)
+    time.sleep(1.0)
+    walk.number = 19
+    walk.shot("patches_around_the_scene")
+    w.do("bpy.context.window_manager.arto.overlay = False")
+    assert not w.get(f"{drawn}._maps")
     for language in ("de_DE", "ja_JP"):
         w.do(LANGUAGE.format(language))
         found = w.get("bpy.app.translations.locale")

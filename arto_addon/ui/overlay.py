@@ -6,6 +6,7 @@ are a thousand radii away, where nobody sees them.
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
 import bpy
@@ -18,6 +19,7 @@ from ...core.hemicube import Hemicube
 from ...core.light import PatchLight
 from ..capture import planes
 from ..live import live
+from ..live.maps import Maps
 from ..shot import paths, status
 from ..shot.shot import layer_of
 from ..world import kept
@@ -27,6 +29,10 @@ from ..world.check import world_of
 FAR = 2.0
 _handle: list[Any] = []
 _drawn: dict[str, Any] = {}
+# Who makes maps of the world while Live is off.
+_maps: list[Maps] = []
+# Seconds between looks at the world.
+EVERY = 0.3
 
 
 def shown() -> bool:
@@ -37,13 +43,60 @@ def switch(on: bool) -> None:
     """Draw it, or not."""
     if on and not _handle and not bpy.app.background:
         _handle.append(bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_VIEW"))
+        bpy.app.timers.register(_follow, first_interval=0.1)
     elif not on and _handle:
-        bpy.types.SpaceView3D.draw_handler_remove(_handle.pop(), "WINDOW")
-        _drawn.clear()
+        _put_out()
+    _redraw()
+
+
+def _put_out() -> None:
+    bpy.types.SpaceView3D.draw_handler_remove(_handle.pop(), "WINDOW")
+    while _maps:
+        _maps.pop().close()
+    if bpy.app.timers.is_registered(_follow):
+        bpy.app.timers.unregister(_follow)
+
+
+def _redraw() -> None:
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
                 area.tag_redraw()
+
+
+def _follow() -> float | None:
+    """Have a map of the world made where nobody else has one, and draw again when it changes."""
+    if not _handle:
+        return None
+    scene = bpy.context.scene
+    world = world_of(scene)
+    if world is None:
+        return EVERY
+    key = kept.shows(scene, world)
+    if key != _drawn.get("key") and map_of(scene) is not None:
+        _drawn["key"] = key
+        _redraw()
+    elif live.current is None and map_of(scene) is None:
+        if not _maps:
+            _maps.append(Maps())
+        # what cannot light anything is said where it is relit
+        with contextlib.suppress(ArtoError):
+            _maps[0].ask(scene, layer_of(scene), world, key[0], False)
+    return EVERY
+
+
+def map_of(scene: bpy.types.Scene) -> Environment | None:
+    """The light of the scene's world, as far as it is at hand."""
+    world = world_of(scene)
+    if world is None:
+        return None
+    key, strength, turn = kept.shows(scene, world)
+    for maps in [live.current.maps] if live.current else _maps:
+        for full in (True, False):
+            image = maps.get(key, full)
+            if image is not None:
+                return Environment(image * np.float32(strength), turn)
+    return None
 
 
 def hemicube_of(scene: bpy.types.Scene) -> Hemicube | None:
@@ -84,18 +137,10 @@ def triangles(hemicube: Hemicube, middle: np.ndarray, size: float) -> tuple[np.n
 
 def colours(scene: bpy.types.Scene, hemicube: Hemicube) -> np.ndarray | None:
     """Each patch's light as a display shows it, (K, 3); None where no map of the world is there."""
-    world = world_of(scene)
-    if world is None:
+    environment = map_of(scene)
+    if environment is None:
         return None
-    key, strength, turn = kept.shows(scene, world)
-    image = None
-    if live.current is not None:
-        image = live.current.maps.get(key, True)
-        if image is None:
-            image = live.current.maps.get(key, False)
-    if image is None:
-        return None
-    light = PatchLight(Environment(image * np.float32(strength), turn), hemicube).whole
+    light = PatchLight(environment, hemicube).whole
     light = light / max(float(np.median(light.max(axis=-1))) * 2, 1e-9)
     return np.clip(light / (1 + light), 0, 1)
 
@@ -133,7 +178,7 @@ def _draw() -> None:
 
 def unregister() -> None:
     if _handle:
-        bpy.types.SpaceView3D.draw_handler_remove(_handle.pop(), "WINDOW")
+        _put_out()
 
 
 def register() -> None:
