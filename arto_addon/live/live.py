@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ...core import exr
 from ...core.errors import ArtoError, SceneError
 from ...core.preview import Preview
+from ...core.region import Region
 from ..blender.colour import working_space
 from ..blender.quitting import not_when_quitting, when_quitting
 from ..job import session, snapshot
@@ -29,8 +30,10 @@ from ..relight.plate import name_of
 from ..relight.relight import Shown
 from ..shot import paths, watch
 from ..shot.shot import check_same_shot, layer_of
+from ..stage.stage import picture_size
 from ..world.check import check_world, world_of
 from ..world.kept import shows
+from ..world.lamp_render import region_of
 from . import maps
 from .viewer import Viewer, Wish
 
@@ -58,6 +61,11 @@ class Live:
         self.viewer = Viewer(Preview([take.field for take in shown.takes]))
         self.maps = maps.Maps()
         self.shape = shown.field.shape
+        # outside a render region a picture is empty
+        self.region = region_of(shown.field)
+        self._shot = self._place(scene)
+        # what only the finished picture has
+        self.later = "its brightness" if shown.held else ""
         self.trouble = ""
         self.line = "Starting"
         self.dirty = True
@@ -89,12 +97,23 @@ class Live:
         shown = self.viewer.take()
         if shown is not None:
             picture = np.repeat(np.repeat(shown.picture, shown.factor, 0), shown.factor, 1)
+            self.name = name_of(scene)
             push(picture[: self.shape[0], : self.shape[1]], self.name)
             size = "Whole" if shown.factor == 1 else f"1/{shown.factor} of the size"
             self.line = f"{size}, after {shown.latency:.2f} s"
+            if self.later:
+                self.line += f"; {self.later} comes when it is finished"
             redraw_pictures()
         self.trouble = self.maps.trouble or self.viewer.trouble
+        if self._place(scene) != self._shot:
+            self.trouble = "Live shows the shot that it was switched on for: this is another one"
         return True
+
+    @staticmethod
+    def _place(scene: bpy.types.Scene) -> tuple[Any, ...]:
+        """What tells this shot from the scene's others."""
+        camera = scene.camera.name if scene.camera else ""
+        return scene.frame_current, scene.frame_subframe, camera, *picture_size(scene)
 
     def _same_field(self) -> bool:
         try:
@@ -142,7 +161,11 @@ class Live:
         if wished != self._wished:
             self._wished = wished
             gains = gains_of(scene.arto)
-            view = None if scene.render.film_transparent else view_of(scene, self.shape)
+            view = None
+            if not scene.render.film_transparent:
+                view = view_of(scene, self.shape, self.region)
+                if view is None:
+                    self.later = "the world behind"
             self.viewer.wish(Wish(image, strength, turn, own, gains, resting, view))
         if rest > FINISHED and self.settled and scene.arto.live_finish:
             self._finish(scene)
@@ -178,9 +201,11 @@ class Live:
         self.maps.close()
 
 
-def view_of(scene: bpy.types.Scene, shape: tuple[int, int]) -> NDArray[np.float32] | None:
-    """The direction that each pixel of the scene's camera sees, (H, W, 3); None for a panorama,
-    whose pixels are not on a plane."""
+def view_of(
+    scene: bpy.types.Scene, shape: tuple[int, int], region: Region
+) -> NDArray[np.float32] | None:
+    """The direction that each pixel of the scene's camera sees, (H, W, 3), 0 outside a region; None
+    for a panorama, whose pixels are not on a plane."""
     camera = scene.camera
     if camera is None or camera.type != "CAMERA" or camera.data.type == "PANO":
         return None
@@ -193,9 +218,12 @@ def view_of(scene: bpy.types.Scene, shape: tuple[int, int]) -> NDArray[np.float3
     turned = np.array(camera.matrix_world.to_3x3().normalized(), np.float32)
     if camera.data.type == "ORTHO":
         look = turned @ np.array([0, 0, -1], np.float32)
-        return np.broadcast_to(look, (height, width, 3))
-    local = corners[3] + x[None, :, None] * right + y[:, None, None] * down
-    return local @ turned.T
+        found = np.broadcast_to(look, (height, width, 3))
+    else:
+        found = (corners[3] + x[None, :, None] * right + y[:, None, None] * down) @ turned.T
+    out = np.zeros_like(found)
+    out[region.slices] = found[region.slices]
+    return out
 
 
 def push(picture: NDArray[np.float32], name: str) -> bpy.types.Image:

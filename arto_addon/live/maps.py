@@ -120,13 +120,17 @@ class Maps:
         blend = self._folder / f"world{self._number}.blend"
         painted = {}
         # images are named by whole paths: the file lies elsewhere
-        bpy.data.libraries.write(str(blend), {world}, path_remap="ABSOLUTE", fake_user=True)
+        written = world.copy() if world.library else world  # what is linked is in no other file
+        name = written.name
+        bpy.data.libraries.write(str(blend), {written}, path_remap="ABSOLUTE", fake_user=True)
+        if written != world:
+            bpy.data.worlds.remove(written)
         for image in images(world):
             if in_no_file(image):
                 painted[image.name] = str(self._folder / painted_pixels(image, self._folder))
         question = Asked(
             blend=str(blend),
-            world=world.name,
+            world=name,
             width=scene.arto.environment_width if full else 0,
             frame=scene.frame_current,
             subframe=scene.frame_subframe,

@@ -24,7 +24,7 @@ MOVING = 0.06
 class Wish:
     """What to show. image: a map of strength 1 and no turn, see `maps`; own, gains: of the scene's
     own lamps; resting: at full size, however long it takes; view: the directions of the pixels, for
-    the world behind, (h, w, 3), None where it is not seen."""
+    the world behind, (h, w, 3), 0 where nothing is, None where it is not seen at all."""
 
     image: NDArray[np.float32]
     strength: float
@@ -126,9 +126,9 @@ def show(preview: Preview, wish: Wish) -> Shown:
         view = wish.view[factor // 2 :: factor, factor // 2 :: factor]
         view = view[: picture.shape[0], : picture.shape[1]]
         h, w = view.shape[:2]
-        behind = environment.at(view)
-        picture[:h, :w, :3] += (1 - picture[:h, :w, 3:]) * behind
-        picture[..., 3] = 1
+        there = view.any(axis=-1, keepdims=True)
+        picture[:h, :w, :3] += (1 - picture[:h, :w, 3:]) * environment.at(view) * there
+        picture[:h, :w, 3:] = np.where(there, 1, picture[:h, :w, 3:])
     return Shown(wish, picture, factor, time.perf_counter() - wish.at)
 
 

@@ -202,6 +202,54 @@ def test_maps_are_those_of_a_relight(scene) -> None:
         made.close()
 
 
+def test_the_world_behind_and_a_render_region(tmp_path) -> None:
+    """An even world is behind the things as it is behind the plate's; outside the region is none."""
+    scene = small_scene(tmp_path)
+    scene.arto.keep, scene.arto.support, scene.arto.samples = "never", "auto", 8
+    scene.arto.grain, scene.arto.patterns, scene.arto.live_finish = False, "linear", False
+    scene.camera.data.lens /= 2
+    scene.render.use_border = True
+    scene.render.border_min_x, scene.render.border_max_y = 0.25, 0.9
+    set_colour(scene, (0.5, 0.4, 0.3), 2.0)
+    work.run(shoot.shoot(scene))
+    plate = next(iter(exr.read(paths.relit_file(scene)).values()))
+    assert (plate[..., 3] == 0).any() and (plate[1:4, 12:, 3] == 1).any()
+    on = live.Live(scene)
+    try:
+        seen = _rest(on)
+    finally:
+        on.close()
+        live.put_away(on.name)
+    assert np.abs(seen - plate).max() < 1e-3 * plate[..., :3].mean()
+
+
+def test_a_linked_world(tmp_path) -> None:
+    """What is in another file lights live as it does here."""
+    scene = small_scene(tmp_path)
+    _hdri(scene)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
+    scene = small_scene(tmp_path)
+    scene.arto.environment_width = 128
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, into):
+        into.worlds = ["World"]
+    scene.world = into.worlds[0]
+    assert scene.world.library
+    made, worlds = maps.Maps(), len(bpy.data.worlds)
+    try:
+        key = kept.shows(scene, scene.world)[0]
+        made.ask(scene, scene.view_layers[0].name, scene.world, key, True)
+        until = time.monotonic() + 60
+        while made.get(key, True) is None:
+            assert not made.trouble, made.trouble
+            assert time.monotonic() < until
+            time.sleep(0.05)
+        expected = kept.environment(scene, 128).image
+        np.testing.assert_array_equal(made.get(key, True), expected)
+    finally:
+        made.close()
+    assert len(bpy.data.worlds) == worlds
+
+
 def test_without_a_capture_it_says_so(tmp_path) -> None:
     scene = small_scene(tmp_path)
     with pytest.raises(ArtoError, match="no reflectance field"):
