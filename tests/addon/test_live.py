@@ -203,7 +203,7 @@ def test_maps_are_those_of_a_relight(scene) -> None:
 
 
 def test_the_world_behind_and_a_render_region(tmp_path) -> None:
-    """An even world is behind the things as it is behind the plate's; outside the region is none."""
+    """An even world is behind the things as it is behind the plate's, in the region alone."""
     scene = small_scene(tmp_path)
     scene.arto.keep, scene.arto.support, scene.arto.samples = "never", "auto", 8
     scene.arto.grain, scene.arto.patterns, scene.arto.live_finish = False, "linear", False
