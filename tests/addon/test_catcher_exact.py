@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 import pytest
 from arto.arto_addon import fit, work
+from arto.arto_addon.blender.colour import working_space
 from arto.arto_addon.capture.beside import TAKES
 from arto.arto_addon.relight import plate, relight
 from arto.arto_addon.shot import paths
@@ -142,7 +143,7 @@ def test_on_an_empty_ground_footage_passes_denoised_too(tmp_path, world):
 
 def float_footage(pixels):
     image = bpy.data.images.new("Filmed", pixels.shape[1], pixels.shape[0], float_buffer=True)
-    image.colorspace_settings.name = bpy.data.colorspace.working_space
+    image.colorspace_settings.name = working_space()
     rgba = np.dstack([pixels, np.ones(pixels.shape[:2])]).astype(np.float32)
     image.pixels.foreach_set(rgba[::-1].ravel())
     image.pack()
