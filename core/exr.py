@@ -163,6 +163,7 @@ class Layers:
             found, self._decoded = _decoded(path)
             heads = [(head, list(p)) for head, p in zip(found, self._decoded, strict=True)]
         self._layers = _layers(path, heads)
+        self._places = [_places(part) for part in self._plain]
 
     def __enter__(self) -> Layers:
         return self
@@ -214,15 +215,13 @@ class Layers:
         part, channels = self._layers[name]
         if not self._plain:
             return [self._decoded[part][channel] for channel in channels]
-        there = self._plain[part]
-        found, at = {}, there.offset
-        for channel, kind in there.channels:
-            dtype = np.dtype("<f2" if kind == 1 else "<f4")
-            found[channel] = np.ndarray(
-                (there.height, there.width), dtype, self._data, at, (there.stride, dtype.itemsize)
-            )
-            at += there.width * dtype.itemsize
-        return [found[channel] for channel in channels]
+        there, found = self._plain[part], []
+        for channel in channels:
+            dtype, at = self._places[part][channel]
+            strides = there.stride, dtype.itemsize
+            shape = there.height, there.width
+            found.append(np.ndarray(shape, dtype, self._data, at, strides))
+        return found
 
     def _filled(self, name: str, planes: list[NDArray]) -> NDArray:
         if any(pixels is None for pixels in planes):
@@ -237,6 +236,17 @@ class Layers:
         for n in reversed(range(len(planes))):
             out[..., n] = planes.pop()  # which lets go of it
         return out
+
+
+def _places(part: PlainPart) -> dict[str, tuple[np.dtype, int]]:
+    """What each channel of a part is of, and where its first row begins. Once for all: a part may
+    be all the thousands of channels of a capture, as Blender 4.5 writes them."""
+    found, at = {}, part.offset
+    for channel, kind in part.channels:
+        dtype = np.dtype("<f2" if kind == 1 else "<f4")
+        found[channel] = dtype, at
+        at += part.width * dtype.itemsize
+    return found
 
 
 def _layers(

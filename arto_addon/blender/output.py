@@ -60,7 +60,7 @@ def float_exr(render: bpy.types.RenderSettings, multilayer: bool = True) -> None
     settings.color_depth = "32"
     settings.exr_codec = "NONE"  # files that are read again at once; packing takes longer
     if FIVE:
-        settings.use_exr_interleave = False  # one part of all layers, as before
+        settings.use_exr_interleave = False  # a part for each layer; before, one of all
     settings.color_management = "FOLLOW_SCENE"
 
 
