@@ -6,9 +6,13 @@ from pathlib import Path
 
 import bpy
 
+from ..core.field import Field
 from .capture.capture import capture
 from .fit import fit
+from .relight.own import sync
+from .relight.present import present
 from .relight.relight import compute
+from .shot import paths
 from .shot.shot import layer_of
 from .work import Progress, Steps, part_of
 from .world.check import world_of
@@ -30,3 +34,13 @@ def shoot(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
         return (None,)
     path, _ = yield from part_of(compute(scene, layer), FITTED, 1 - FITTED)
     return (Path(path),)
+
+
+def shoot_and_show(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
+    """`shoot`, here: the plate comes into the scene's compositor, and its lamps into the panel."""
+    layer = view_layer or layer_of(scene)
+    (path,) = yield from shoot(scene, layer)
+    sync(scene, Field(paths.field_folder(scene, layer)))
+    if path is not None:
+        present(scene, path)
+    return (path,)

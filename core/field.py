@@ -120,7 +120,7 @@ class Field:
     @property
     def own_layers(self) -> list[str]:
         """The layers of light groups of the scene's own lamps, see `basis_images.own_layer`."""
-        found = {p.stem for tile in self.tiles for p in tile.folder.glob("own_*.npy")}
+        found = {name for tile in self.tiles for name in tile.own_layers()}
         return sorted(name for name in found if self.has_layer(name))
 
     def layer(self, name: str) -> NDArray[np.float32]:

@@ -153,6 +153,10 @@ class Tile:
     def has_layer(self, name: str) -> bool:
         return (self.folder / f"{name}.npy").is_file()
 
+    def own_layers(self) -> list[str]:
+        """Its layers of light groups of the scene's own lamps."""
+        return [p.stem for p in self.folder.glob("own_*.npy")]
+
     @cached_property
     def models(self) -> list[Model]:
         """The support models in use, in the order of their codes."""

@@ -17,6 +17,7 @@ from .catcher import catch
 from .field import HEADER, Field, proxy_folder
 from .hemicube import Hemicube
 from .light import PatchLight
+from .merged import merged
 from .proxy import FACTORS
 from .relight import relights
 
@@ -46,7 +47,7 @@ class Preview:
     def level(self, factor: int) -> tuple[Field, ...]:
         """The fields at 1 / factor of the size. Raises FieldError."""
         if factor not in self._levels:
-            self._levels[factor] = tuple(t.proxy(factor) for t in self.takes)
+            self._levels[factor] = tuple(merged(t.proxy(factor)) for t in self.takes)
         return self._levels[factor]
 
     def shape(self, factor: int) -> tuple[int, int]:

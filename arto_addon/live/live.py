@@ -9,6 +9,7 @@ longer a relight is started, with the world's lamps and denoised.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from ...core.preview import Preview
 from ...core.region import Region
 from ..blender.colour import working_space
 from ..blender.quitting import not_when_quitting, when_quitting
-from ..job import session, snapshot
+from ..job import session
 from ..relight.light_key import HEADER, light_key
 from ..relight.own import gains_of
 from ..relight.plate import name_of
@@ -76,6 +77,7 @@ class Live:
         self._asked_with = 1.0, 0.0
         self._finished: tuple[Any, ...] = ()
         self.relighting = False
+        self.revealed = False
         self.maps.start()
 
     @property
@@ -98,7 +100,11 @@ class Live:
         if shown is not None:
             picture = np.repeat(np.repeat(shown.picture, shown.factor, 0), shown.factor, 1)
             self.name = name_of(scene)
-            push(picture[: self.shape[0], : self.shape[1]], self.name)
+            image = push(picture[: self.shape[0], : self.shape[1]], self.name)
+            if not self.revealed:
+                self.revealed = True
+                if reveal and not any(space.image == image for space in spaces()):
+                    reveal(image)
             size = "Whole" if shown.factor == 1 else f"1/{shown.factor} of the size"
             self.line = f"{size}, after {shown.latency:.2f} s"
             if self.later:
@@ -265,6 +271,8 @@ def redraw_pictures() -> None:
                 area.tag_redraw()
 
 
+# How a picture is brought before the artist; of the window.
+reveal: Callable[[bpy.types.Image], None] | None = None
 current: Live | None = None
 # Why it is off, where it went off by itself.
 trouble = ""
@@ -290,15 +298,14 @@ def stop() -> None:
     put_away(ended.name)
 
 
-def put_away(name: str) -> None:
-    """Remove the live image: it is of no file."""
-    image = bpy.data.images.get(IMAGE)
-    if image is None:
-        return
-    for space in spaces():
-        if space.image == image:
-            space.image = bpy.data.images.get(name)
-    bpy.data.images.remove(image)
+def put_away(name: str, *others: str) -> None:
+    """Remove the live image, and others by their names: they are of no file. Editors that show them
+    show the plate of that name."""
+    for image in filter(None, map(bpy.data.images.get, (IMAGE, *others))):
+        for space in spaces():
+            if space.image == image:
+                space.image = bpy.data.images.get(name)
+        bpy.data.images.remove(image)
 
 
 def _tick() -> float | None:
@@ -328,6 +335,13 @@ def _changed(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 
 @persistent
+def _undone(*_: object) -> None:
+    """An undo took the live image with it: it is made again, and shown."""
+    if current is not None:
+        current.dirty, current.revealed, current._wished = True, False, ()
+
+
+@persistent
 def _stop(*_: object) -> None:
     stop()
 
@@ -341,17 +355,11 @@ def _quitting(*_: object) -> None:
         ended.close()
 
 
-@persistent
-def _before_save(*_: object) -> None:
-    if current is not None and not snapshot.taking:
-        put_away(current.name)
-        current._wished = ()
-
-
 _HANDLERS = {
     "depsgraph_update_post": _changed,
     "load_pre": _stop,
-    "save_pre": _before_save,
+    "undo_post": _undone,
+    "redo_post": _undone,
 }
 
 

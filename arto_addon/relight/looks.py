@@ -13,6 +13,7 @@ from ..shot import paths
 from ..shot.shot import check_same_shot, layer_of
 from ..work import Progress, Steps
 from ..world.check import world_of
+from .present import present
 from .relight import Light, Ready, Shown, finish, make_ready
 
 
@@ -61,6 +62,21 @@ def show(scene: bpy.types.Scene) -> None:
         scene.world = look.world
 
 
+def named(scene: bpy.types.Scene, look: Any) -> None:
+    """A look was given a name: no other has it, and the one that is shown is called so."""
+    settings = scene.arto
+    others = {k.name for k in settings.looks if k != look}
+    name = look.name.strip() or "Look"
+    if name in others:
+        name = free_name(scene, name)
+    if name != look.name:
+        look.name = name  # which comes here again
+        return
+    shown = settings.active_look
+    if 0 <= shown < len(settings.looks) and settings.looks[shown] == look:
+        settings.look = name
+
+
 def free_name(scene: bpy.types.Scene, name: str) -> str:
     """That name, or with a number after it where a look has it."""
     taken, number, found = {look.name for look in scene.arto.looks}, 2, name
@@ -95,4 +111,12 @@ def relight_looks(scene: bpy.types.Scene, view_layer: str) -> Steps:
             yield from finish(shown, one, picture)
             done.append(one.lit.path)
     yield Progress(1.0, f"wrote {len(done)} looks, the last one {done[-1].name}")
+    return done
+
+
+def show_looks(scene: bpy.types.Scene, view_layer: str) -> Steps:
+    """`relight_looks`, here: each plate comes into the scene's compositor."""
+    done = yield from relight_looks(scene, view_layer)
+    for look, path in zip((k for k in scene.arto.looks if k.world), done, strict=True):
+        present(scene, path, look.name)
     return done

@@ -16,6 +16,7 @@ from .mixer import mixer
 from .plate import (
     CATCHER,
     LAYERS,
+    SHARE,
     SOURCE,
     layers_file,
     name_of,
@@ -65,11 +66,16 @@ def present_frames(
 
     first: the first frame's file. They stand beside the plate of a single frame.
     """
-    name = f"{name_of(scene, look)} Frames"
-    image = show(shown_file(first, exr.header(first)), name)
-    image.source = "SEQUENCE"
-    group = node_group(image, name)
-    if source := group.nodes.get(SOURCE):
+    name, header = f"{name_of(scene, look)} Frames", exr.header(first)
+    image = show(shown_file(first, header), name)
+    share = None
+    if CATCHER in header:
+        share = show(share_file(first), f"{name} Catcher")
+    group = node_group(image, name, share)
+    for image_of, node in ((image, SOURCE), (share, SHARE)):
+        if image_of is None or (source := group.nodes.get(node)) is None:
+            continue
+        image_of.source = "SEQUENCE"
         source.frame_duration = frames[-1] - frames[0] + 1
         source.frame_start = frames[0]
         # a sequence counts its files from 1

@@ -63,9 +63,18 @@ class ArtoGroup(bpy.types.PropertyGroup):
     )
 
 
+def _look_named(self: ArtoLook, context: bpy.types.Context) -> None:
+    looks.named(self.id_data, self)
+
+
 class ArtoLook(bpy.types.PropertyGroup):
     """A light that the shot is shown in. Its name is that of its plate."""
 
+    name: StringProperty(
+        name="Name",
+        description="What the look is called; its plate is named after it",
+        update=_look_named,
+    )
     world: PointerProperty(
         type=bpy.types.World, name="World", description="The world that lights this look"
     )

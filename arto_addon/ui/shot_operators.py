@@ -12,8 +12,8 @@ from ...core.errors import SceneError
 from ...core.files import Lock
 from ..capture.check import check_scene
 from ..relight import looks
-from ..relight.looks import relight_looks
-from ..shoot import shoot
+from ..relight.looks import show_looks
+from ..shoot import shoot_and_show
 from ..shot import paths
 from ..shot.shot import layer_of
 from ..work import Steps
@@ -43,7 +43,7 @@ class ARTO_OT_shoot(LongWork):
         check_scene(scene)
 
     def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
-        return shoot(scene, view_layer)
+        return shoot_and_show(scene, view_layer)
 
 
 class ARTO_OT_set_back(Quick):
@@ -185,7 +185,7 @@ class ARTO_OT_relight_looks(LongWork):
         return free(cls) and can_relight(cls, context)
 
     def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
-        return relight_looks(scene, view_layer)
+        return show_looks(scene, view_layer)
 
 
 class ARTO_OT_open_guide(Quick):

@@ -25,6 +25,8 @@ from .words import tr
 _GUESS = 5e-6
 # And of all that is no path: starting, probing, fitting the last tile.
 OTHERS = 8.0
+# A shot with shadow catchers is captured so often, and takes so much longer than once.
+TAKES, THREE_TAKES = 3, 1.6
 
 
 @dataclass(frozen=True)
@@ -130,10 +132,13 @@ def price(scene: bpy.types.Scene, unfinished: bool = False) -> tuple[str, ...]:
     try:
         found = most(scene)
         pixels = picture_region(scene).pixels
+        catches = any(thing.is_shadow_catcher for thing in scene.objects)
+        found = found.times(TAKES) if catches else found
     except ArtoError as e:
         return (str(e),)
     samples = samples_of(scene)
     left, known = _seconds(scene, pixels * samples, unfinished)
+    left *= THREE_TAKES if catches else 1.0
     text = "About {time}, {samples} samples" if known else "Perhaps {time}, {samples} samples"
     first = tr(text, time=clock(left), samples=samples)
     disk, kept = size(found.disk), size(found.kept)

@@ -6,13 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+from bpy.app.handlers import persistent
 
-from ..job import session
+from ..job import session, snapshot
 from ..job.session import Job
 from ..live import live
-from ..relight import compare, own
+from ..relight import compare, inside, own
 from ..relight.many import frames_of
-from ..relight.plate import show
+from ..relight.plate import name_of, show
 from ..relight.present import present, present_frames
 from ..relight.verify import verify_file
 from ..shot import paths
@@ -91,6 +92,18 @@ def show_verified(job: Job) -> str:
     return job.state.text
 
 
+# Pictures of the window: they are of no file, and a saved one has them not.
+OURS = (inside.IMAGE, inside.FROM, compare.IMAGE)
+
+
+@persistent
+def _before_save(*_: object) -> None:
+    if not snapshot.taking:
+        live.put_away(name_of(bpy.context.scene), *OURS)
+        if live.current is not None:
+            live.current._wished = ()
+
+
 _FINISHERS = {
     "relight": show_relit,
     "relight_frames": show_relit,
@@ -104,6 +117,9 @@ _FINISHERS = {
 
 def register() -> None:
     session.finishers.update(_FINISHERS)
+    live.reveal = reveal
+    if not bpy.app.background:
+        bpy.app.handlers.save_pre.append(_before_save)
     keys = bpy.context.window_manager.keyconfigs.addon
     if keys:  # none without a window
         # the last one to be asked: whatever else takes an ESC has it first
@@ -115,6 +131,10 @@ def unregister() -> None:
     for verb in _FINISHERS:
         session.finishers.pop(verb, None)
     compare.forget()
+    live.reveal = None
+    if _before_save in bpy.app.handlers.save_pre:
+        bpy.app.handlers.save_pre.remove(_before_save)
+        live.put_away(name_of(bpy.context.scene), *OURS)
     while _keys:
         keymap, item = _keys.pop()
         keymap.keymap_items.remove(item)

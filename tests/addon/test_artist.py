@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 import pytest
 from arto.arto_addon import fit, shoot, work
+from arto.arto_addon.blender.compositing import compositor
 from arto.arto_addon.capture import planes
 from arto.arto_addon.relight import compare, inside, looks
 from arto.arto_addon.relight.composite import save_composite
@@ -264,6 +265,42 @@ def test_a_built_hemicube_can_be_seen_and_is_the_one_that_captures(tmp_path) -> 
         o.matrix_world @ v.co for o in planes.of_artist(scene).objects for v in o.data.vertices
     ]
     assert max(abs(x) for corner in corners for x in corner) < 10 * radius
+
+
+def test_the_button_in_a_batch_run_shows_the_plate(tmp_path) -> None:
+    """As the three operators do: image and node are in the file, and the lamps in the panel."""
+    scene = small_scene(tmp_path, lamp=True)
+    scene.view_layers[0].lightgroups.add(name="sun")
+    scene.objects["Sun"].lightgroup = "sun"
+    scene.arto.keep, scene.arto.support, scene.arto.samples = "never", "auto", 8
+    scene.arto.grain, scene.arto.patterns = False, "linear"
+    assert bpy.ops.arto.shoot() == {"FINISHED"}
+    assert tuple(bpy.data.images["ARTO Relit"].size) == (24, 18)
+    assert any(n.label == "ARTO Relit" for n in compositor(scene).nodes)
+    assert [g.name for g in scene.arto.own_groups] == ["sun"]
+    # the lamp off by its eye: what is left is the world's light
+    with_sun = _plate(scene)
+    scene.arto.own_groups[0].show = False
+    bpy.ops.arto.relight()
+    without = _plate(scene)
+    scene.arto.own_groups[0].show, scene.arto.own_lamps = True, 0.0
+    bpy.ops.arto.relight()
+    np.testing.assert_allclose(without, _plate(scene), atol=2e-3)
+    assert with_sun[..., :3].mean() > 1.2 * without[..., :3].mean()
+
+
+def test_no_two_looks_have_one_name(tmp_path) -> None:
+    scene = small_scene(tmp_path)
+    looks.add(scene, "Dawn")
+    looks.add(scene, "Dusk")
+    settings = scene.arto
+    settings.looks[1].name = "Dawn"
+    assert [k.name for k in settings.looks] == ["Dawn", "Dawn 2"]
+    assert settings.look == "Dawn 2"
+    settings.looks[0].name = "Noon"
+    assert settings.look == "Dawn 2"
+    settings.looks[1].name = ""
+    assert settings.look == settings.looks[1].name == "Look"
 
 
 def test_sentences_are_never_clipped() -> None:

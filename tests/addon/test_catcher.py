@@ -16,6 +16,7 @@ from arto.arto_addon.farm.plan import plan
 from arto.arto_addon.relight import plate, relight
 from arto.arto_addon.relight.footage import footage
 from arto.arto_addon.relight.many import relight_many
+from arto.arto_addon.relight.present import present_frames
 from arto.arto_addon.shot import paths
 from arto.arto_addon.stage.stage import stage
 from arto.arto_addon.world import kept
@@ -334,6 +335,15 @@ def test_frames_with_a_catcher(tmp_path):
     half = left.shape[1] // 2
     assert left[:, :half].mean() < left[:, half:].mean() - 0.02
     assert right[:, half:].mean() < right[:, :half].mean() - 0.02
+    # and in the compositor: the footage of each frame has that frame's shadow
+    present_frames(scene, done[0], [1, 2])
+    node = in_compositor(scene, bpy.data.node_groups["ARTO Relit Frames"], "Composite")
+    node.inputs["Footage"].default_value = (0.5, 0.5, 0.5, 1)
+    for frame, path in zip((1, 2), done, strict=True):
+        scene.frame_set(frame)
+        expected = exr.read(path)[""][..., :3] + 0.5 * exr.read(plate.share_file(path))[""]
+        found = composited(scene, tmp_path)
+        np.testing.assert_allclose(found[..., :3], expected, atol=2e-3)
 
 
 def test_farms_refuse_catchers(tmp_path):
