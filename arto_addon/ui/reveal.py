@@ -7,6 +7,8 @@ import bpy
 
 def reveal(image: bpy.types.Image) -> None:
     """Show an image in an image editor that is open, else where a render would be shown."""
+    if bpy.app.background:
+        return
     area = editor()
     if area is None:
         bpy.ops.render.view_show("INVOKE_DEFAULT")
