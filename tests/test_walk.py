@@ -139,8 +139,8 @@ scene.render.resolution_percentage = 100
 scene.cycles.samples = 32
 sky = pathlib.Path(bpy.utils.system_resource("DATAFILES")) / "studiolights/world/sunset.exr"
 bpy.ops.arto.open_hdri(filepath=str(sky))
-# the lamps of 2010 outshine any sky
-scene.arto.own_lamps = 0.02
+for lamp in bpy.data.lights:
+    lamp.energy *= 0.02  # those of 2010 outshine any sky
 scene.arto.memory = 250
 bpy.ops.wm.save_mainfile()
 """
