@@ -67,7 +67,7 @@ class Live:
         self._shot = self._place(scene)
         # what only the finished picture has
         self.later = "its brightness" if shown.held else ""
-        self.trouble = ""
+        self.trouble = self.problem = ""
         self.line = "Starting"
         self.dirty = True
         self._looked = 0.0
@@ -110,7 +110,7 @@ class Live:
             if self.later:
                 self.line += f"; {self.later} comes when it is finished"
             redraw_pictures()
-        self.trouble = self.maps.trouble or self.viewer.trouble
+        self.trouble = self.problem or self.maps.trouble or self.viewer.trouble
         if self._place(scene) != self._shot:
             self.trouble = "Live shows the shot that it was switched on for: this is another one"
         return True
@@ -147,11 +147,15 @@ class Live:
         world = world_of(scene, self.layer)
         full = self.maps.get(key, True)
         image = full if full is not None else self.maps.get(key, False)
-        if world and not self.maps.busy:
-            if image is None and self.maps.ask(scene, self.layer, world, key, False):
-                self._asked_with = strength, turn
-            elif image is not None and full is None and rest > WHOLE:
-                self.maps.ask(scene, self.layer, world, key, True)
+        self.problem = ""
+        try:
+            if world and not self.maps.busy:
+                if image is None and self.maps.ask(scene, self.layer, world, key, False):
+                    self._asked_with = strength, turn
+                elif image is not None and full is None and rest > WHOLE:
+                    self.maps.ask(scene, self.layer, world, key, True)
+        except SceneError as e:  # an HDRI is taken out before another is put in
+            self.problem = str(e)
         if image is None:
             # the hand is quicker than maps are made: the last one is nearer than none
             newest = self.maps.newest
