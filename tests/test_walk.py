@@ -248,6 +248,9 @@ def test_an_hour_of_an_artist(walk: Walk, tmp_path: Path, program: Program) -> N
         "area=area, region=region); o.__enter__(); bpy.ops.node.view_all(); o.__exit__()"
     )
     walk.shot("mixing")
+    light = MODULE.format("ui.light_panel")
+    gain = f"{light}.mixer_of(bpy.context.scene).inputs['LG_left'].default_value"
+    assert w.get(gain) == 3.0
     w.do("area.ui_type = 'VIEW_3D'")
     time.sleep(0.3)
     w.do(TAB)

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import contextlib
+from typing import Any
 
 import bpy
 
 from ...core import exr
 from ...core.errors import ArtoError
+from ..blender.compositing import compositor
 from ..live import live
+from ..relight.plate import name_of
+from ..relight.present import MIX
 from ..shot import paths, status
 from ..world import controls
 from ..world.check import world_of
@@ -32,6 +36,7 @@ class Light(Draws):
         _world(column, context, world)
         _live(column, context)
         _own(column, context)
+        _layers(column, context)
         _looks(column, context)
 
 
@@ -104,6 +109,33 @@ def _own(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
         sub = row.row()
         sub.enabled = group.show
         sub.prop(group, "gain", text=group.name, translate=False)
+
+
+def mixer_of(scene: bpy.types.Scene) -> Any:
+    """The node in the scene's compositor that mixes the layers of its plate; None without one."""
+    tree, name = compositor(scene), name_of(scene) + MIX
+    nodes = tree.nodes if tree else ()
+    return next(
+        (n for n in nodes if getattr(n, "node_tree", None) and n.node_tree.name == name), None
+    )
+
+
+def _layers(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Gains and tints of the plate's layers: the mixer's own, where there is one."""
+    node = mixer_of(context.scene)
+    if node is None or context.scene.arto.layers == "OFF":
+        return
+    say(column, context, "Layers, in the compositor")
+    for socket in node.inputs:
+        tint = node.inputs.get(f"{socket.name} Tint")
+        if tint is None or socket.is_linked:
+            continue
+        row = column.row(align=True)
+        name = socket.name.removeprefix(context.scene.arto.layer_prefix)
+        row.prop(socket, "default_value", text=name, translate=False)
+        sub = row.row(align=True)
+        sub.scale_x = 0.3
+        sub.prop(tint, "default_value", text="")
 
 
 class ARTO_UL_looks(bpy.types.UIList):

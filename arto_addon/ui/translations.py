@@ -81,6 +81,7 @@ Captured, but not fitted yet | Aufgenommen, noch nicht angepasst | キャプチ�
 Only the render region is captured | Nur der Renderbereich wird aufgenommen | レンダー領域のみキャプチャします
 Capture the shot to see it live | Für Live erst aufnehmen | ライブにはキャプチャが必要です
 Follows the world as you change it | Folgt der Welt, während du sie änderst | ワールドの変更に追従します
+Layers, in the compositor | Ebenen, im Compositor | レイヤー(コンポジター)
 Capture the shot first | Erst die Einstellung aufnehmen | 先にショットをキャプチャしてください
 Stopping | Wird beendet | 停止中
 {tiles} done, | {tiles} fertig, | {tiles} 完了、
