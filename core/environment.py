@@ -71,6 +71,15 @@ class Environment:
         row = np.floor((0.5 - np.arctan2(z, np.hypot(x, y)) / np.pi) * height).astype(np.intp)
         return self.image[np.minimum(row, height - 1), column]
 
+    def coarser(self, scale: int) -> Environment:
+        """The map with `scale` times fewer texels a side, each the mean over its solid angle; both
+        sides must be multiples of it."""
+        height, width = self.image.shape[:2]
+        weights = self.row_solid_angles.reshape(-1, scale)
+        blocks = self.image.reshape(height // scale, scale, width // scale, scale, 3)
+        rows = np.einsum("hs,hswtc->hwc", weights / weights.sum(axis=1, keepdims=True), blocks)
+        return Environment((rows / scale).astype(np.float32), self.turn)
+
     def irradiance(self) -> NDArray[np.float64]:
         """(3,): radiance integrated over all directions."""
         rows = self.image.sum(axis=1, dtype=np.float64)

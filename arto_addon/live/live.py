@@ -22,7 +22,7 @@ from ...core import exr
 from ...core.errors import ArtoError, SceneError
 from ...core.preview import Preview
 from ...core.region import Region
-from ..blender.colour import working_space
+from ..blender.pictures import put
 from ..blender.quitting import not_when_quitting, when_quitting
 from ..job import session
 from ..relight.light_key import HEADER, light_key
@@ -110,7 +110,8 @@ class Live:
             if self.later:
                 self.line += f"; {self.later} comes when it is finished"
             redraw_pictures()
-        self.trouble = self.problem or self.maps.trouble or self.viewer.trouble
+        said = self.maps.trouble_with(self._now[0])
+        self.trouble = self.problem or said or self.viewer.trouble
         if self._place(scene) != self._shot:
             self.trouble = "Live shows the shot that it was switched on for: this is another one"
         return True
@@ -238,21 +239,7 @@ def view_of(
 
 def push(picture: NDArray[np.float32], name: str) -> bpy.types.Image:
     """Put a picture (H, W, 4), rows top-down, into the live image, shown as the plate is."""
-    height, width = picture.shape[:2]
-    image = bpy.data.images.get(IMAGE)
-    if image is not None and (image.source != "GENERATED" or image.library):
-        bpy.data.images.remove(image)
-        image = None
-    if image is None:
-        image = bpy.data.images.new(IMAGE, width, height, alpha=True, float_buffer=True)
-        image.colorspace_settings.name = working_space()
-        image.alpha_mode = "PREMUL"
-        image.use_view_as_render = True
-        image.use_fake_user = False
-    elif tuple(image.size) != (width, height):
-        image.scale(width, height)
-    image.pixels.foreach_set(np.ascontiguousarray(picture[::-1], np.float32).ravel())
-    image.update()
+    image = put(IMAGE, picture)
     # where the plate is looked at, its light is now seen live
     for space in spaces():
         shown = space.image

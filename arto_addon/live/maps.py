@@ -62,7 +62,11 @@ class Maps:
     """The window's side: maps by what they are of, and the Blender that makes them."""
 
     def __init__(self) -> None:
-        self._folder = Path(tempfile.mkdtemp(prefix="arto-live-"))
+        """Raises SceneError where there is no room for its files."""
+        try:
+            self._folder = Path(tempfile.mkdtemp(prefix="arto-live-"))
+        except OSError as e:
+            raise SceneError(f"there is no room for temporary files ({e})") from e
         self._process: subprocess.Popen[str] | None = None
         self._found: OrderedDict[tuple[str, bool], NDArray[np.float32]] = OrderedDict()
         self._asked: tuple[str, bool] | None = None
@@ -71,7 +75,7 @@ class Maps:
         self._lock = threading.Lock()
         self.trouble = ""
         self._number = 0
-        self._failed: set[tuple[str, bool]] = set()
+        self._failed: dict[tuple[str, bool], str] = {}
 
     def start(self) -> None:
         """Start the Blender. Raises SceneError."""
@@ -96,6 +100,11 @@ class Maps:
             if found is not None:
                 self._found.move_to_end((key, full))
             return found
+
+    def trouble_with(self, key: str) -> str:
+        """Why no map of that can be made; empty where one was, or nobody has tried."""
+        with self._lock:
+            return self._failed.get((key, False)) or self._failed.get((key, True)) or ""
 
     @property
     def busy(self) -> bool:
@@ -122,9 +131,13 @@ class Maps:
         # images are named by whole paths: the file lies elsewhere
         written = world.copy() if world.library else world  # what is linked is in no other file
         name = written.name
-        bpy.data.libraries.write(str(blend), {written}, path_remap="ABSOLUTE", fake_user=True)
-        if written != world:
-            bpy.data.worlds.remove(written)
+        try:
+            bpy.data.libraries.write(str(blend), {written}, path_remap="ABSOLUTE", fake_user=True)
+        except (OSError, RuntimeError) as e:
+            raise SceneError(f"the world cannot be written to {blend} ({e})") from e
+        finally:
+            if written != world:
+                bpy.data.worlds.remove(written)
         for image in images(world):
             if in_no_file(image):
                 painted[image.name] = str(self._folder / painted_pixels(image, self._folder))
@@ -152,22 +165,30 @@ class Maps:
     def _listen(self, process: subprocess.Popen[str]) -> None:
         assert process.stdout
         for line in process.stdout:
-            if not line.startswith(ANSWER):
-                continue
-            said = json.loads(line[len(ANSWER) :])
-            with self._lock:
-                asked, self._asked = self._asked, None
-                self.trouble = said.get("error", "")
-                if asked is None:
-                    continue
-                if self.trouble:
-                    self._failed.add(asked)
-                    continue
-                self._found[asked] = np.load(said["map"])
-                self.newest = asked[0], self._found[asked]
-                while len(self._found) > MOST:
-                    self._found.popitem(last=False)
-        self._asked = None
+            if line.startswith(ANSWER):
+                try:
+                    said = json.loads(line[len(ANSWER) :])
+                    found = None if "error" in said else np.load(said["map"])
+                    self._answered(found, said.get("error", ""))
+                except (OSError, ValueError, EOFError, KeyError) as e:
+                    self._answered(None, f"the map of the world cannot be read ({e})")
+        # it ended; a world that ends it is not asked for again
+        self._answered(None, "the Blender that makes maps of the world ended: change the world")
+
+    def _answered(self, found: NDArray[np.float32] | None, error: str) -> None:
+        """What was asked for has come, or never will."""
+        with self._lock:
+            asked, self._asked = self._asked, None
+            if asked is None:
+                return
+            self.trouble = error
+            if found is None:
+                self._failed[asked] = error
+                return
+            self._found[asked] = found
+            self.newest = asked[0], found
+            while len(self._found) > MOST:
+                self._found.popitem(last=False)
 
     def close(self) -> None:
         """End it, and remove its files."""

@@ -145,10 +145,6 @@ def _coarse(image: NDArray[np.float32]) -> NDArray[np.float32]:
     scale = width // COARSE
     if scale < 2 or width % scale or height % scale:
         return image
-    edges = np.cos(np.linspace(0, np.pi, height + 1))
-    weights = (edges[:-1] - edges[1:]).reshape(-1, scale)
-    blocks = image.reshape(height // scale, scale, width // scale, scale, 3)
-    rows = np.einsum("hs,hswtc->hwc", weights / weights.sum(axis=1, keepdims=True), blocks)
-    out = (rows / scale).astype(np.float32)
+    out = Environment(image).coarser(scale).image
     _last[:] = [(image, out)]
     return out

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from ...core import exr
 from ...core.errors import SceneError
-from ..blender.colour import working_space
+from ..blender.output import float_exr
+from ..blender.pictures import put
 from ..shot import paths
 
 IMAGE = "ARTO Compare"
@@ -42,8 +43,6 @@ def _last_render(scene: bpy.types.Scene) -> NDArray[np.float32]:
     result = bpy.data.images.get("Render Result")
     settings = bpy.data.scenes.new("ARTO Output")
     try:
-        from ..blender.output import float_exr
-
         float_exr(settings.render, multilayer=False)
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "render.exr"
@@ -67,19 +66,7 @@ def update(scene: bpy.types.Scene) -> bpy.types.Image | None:
     if found is None:
         return None
     plate, render = found
-    out = joined(plate, render, scene.arto.compare, scene.arto.wipe)
-    image = bpy.data.images.get(IMAGE)
-    height, width = out.shape[:2]
-    if image is None:
-        image = bpy.data.images.new(IMAGE, width, height, alpha=True, float_buffer=True)
-        image.colorspace_settings.name = working_space()
-        image.alpha_mode = "PREMUL"
-        image.use_view_as_render = True
-    elif tuple(image.size) != (width, height):
-        image.scale(width, height)
-    image.pixels.foreach_set(np.ascontiguousarray(out[::-1]).ravel())
-    image.update()
-    return image
+    return put(IMAGE, joined(plate, render, scene.arto.compare, scene.arto.wipe))
 
 
 def joined(plate: NDArray, render: NDArray, how: str, wipe: float) -> NDArray[np.float32]:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import SceneError
-from ..blender.colour import working_space
 from ..blender.compositing import OUTPUT, composited, compositor, own_compositor
+from ..blender.pictures import put
 from ..shot import paths
 from ..work import Progress, Steps
 
@@ -41,12 +41,8 @@ def save_composite(scene: bpy.types.Scene, view_layer: str) -> Steps:
     path = composite_file(scene)
     yield Progress(0.1, "compositing")
     picture = _composited(scene)
-    height, width = picture.shape[:2]
-    image = bpy.data.images.new(COMPOSITE, width, height, alpha=True, float_buffer=True)
+    image = put(COMPOSITE, picture)
     try:
-        image.colorspace_settings.name = working_space()
-        image.alpha_mode = "PREMUL"
-        image.pixels.foreach_set(np.ascontiguousarray(picture[::-1]).ravel())
         image.save_render(str(path), scene=scene)
     except RuntimeError as e:
         raise SceneError(f"{path} cannot be written ({e})") from e

@@ -60,6 +60,11 @@ def verify_plate(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps
             renders.append(next(p for n, p in parts.items() if n.endswith("Combined")))
     if renders[0].shape[:2] != there.shape[:2]:
         raise SceneError("the plate has another size than a render now: press Relight first")
+    for what, picture in (("the plate", there), ("the render", renders[0] + renders[1])):
+        if bad := int((~np.isfinite(picture)).any(axis=-1).sum()):
+            raise SceneError(
+                f"{what} has {bad} pixels that are infinite or not a number, and cannot be compared"
+            )
     yield Progress(0.95, "comparing")
     samples = Field(paths.field_folder(scene, layer)).about.get("samples") or SAMPLES
     ratio = 2 * SAMPLES / samples

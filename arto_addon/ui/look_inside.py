@@ -6,10 +6,9 @@ from typing import Any
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.errors import ArtoError
-from ..blender.colour import working_space
+from ..blender.pictures import put
 from ..live.live import IMAGE as LIVE
 from ..relight import compare, inside
 from ..relight.plate import name_of
@@ -17,24 +16,6 @@ from ..world import controls
 from ..world.check import world_of
 from .operators import Quick, can_relight, free
 from .reveal import reveal
-
-
-def image_of(name: str, picture: NDArray[np.float32], display: bool = False) -> bpy.types.Image:
-    """A picture (H, W, 4), rows top-down, as an image of the window. display: it is as a display
-    shows it, and no scene."""
-    height, width = picture.shape[:2]
-    image = bpy.data.images.get(name)
-    if image is not None and (image.source != "GENERATED" or tuple(image.size) != (width, height)):
-        bpy.data.images.remove(image)
-        image = None
-    if image is None:
-        image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=True)
-        image.colorspace_settings.name = working_space()
-        image.alpha_mode = "PREMUL"
-        image.use_view_as_render = not display
-    image.pixels.foreach_set(np.ascontiguousarray(picture[::-1], np.float32).ravel())
-    image.update()
-    return image
 
 
 def under(context: bpy.types.Context, event: bpy.types.Event) -> tuple[Any, float, float] | None:
@@ -141,7 +122,7 @@ patches with the HDRI on them"""
         width, height = space.image.size
         x, y = int(np.floor(u * width)), int(np.floor((1 - v) * height))
         found = inside.look(context.scene, x, y)
-        space.image = image_of(inside.IMAGE, found.picture, display=True)
+        space.image = put(inside.IMAGE, found.picture, display=True)
         return "\n".join(found.lines)
 
 
@@ -163,14 +144,14 @@ from there gives to it"""
         shown = inside.Shown(scene, inside.layer_of(scene))
         environment = inside.environment_of(scene)
         picture = inside.drawn(shown.field.hemicube, environment, [], inside.SIDE, show=0.0)
-        reveal(image_of(inside.IMAGE, picture, display=True))
+        reveal(put(inside.IMAGE, picture, display=True))
 
     def picked(self, context: bpy.types.Context, space: Any, u: float, v: float) -> str:
         direction = inside.direction_at(context.scene, space.image.name, u, v)
         if direction is None:
             return "That is beside the patches: click on them"
         picture, text = inside.light_from(context.scene, direction)
-        space.image = image_of(inside.FROM, picture)
+        space.image = put(inside.FROM, picture)
         return text
 
 

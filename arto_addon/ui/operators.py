@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from pathlib import Path
 
 import bpy
 
@@ -265,6 +266,22 @@ class ARTO_OT_adopt(Quick):
         return f"what was captured for {place.owner} is used here too, in {folder}"
 
 
+def own_place(scene: bpy.types.Scene) -> paths.Place:
+    """Where the shot's files are. Raises SceneError where they are another's."""
+    place = paths.place(scene, layer_of(scene))
+    if place.owner:
+        raise SceneError(f"what is there is of {place.owner}")
+    return place
+
+
+def remove_folder(folder: Path) -> None:
+    """Raises SceneError."""
+    try:
+        shutil.rmtree(folder)
+    except OSError as e:
+        raise SceneError(f"{folder} cannot be removed ({e})") from e
+
+
 class ARTO_OT_discard_unfinished(Quick):
     """Remove the captures of this shot that were stopped, with their finished tiles"""
 
@@ -279,19 +296,14 @@ class ARTO_OT_discard_unfinished(Quick):
         return context.window_manager.invoke_confirm(self, event)
 
     def work(self, context: bpy.types.Context) -> str:
-        place = paths.place(context.scene, layer_of(context.scene))
-        if place.owner:
-            raise SceneError(f"what is there is of {place.owner}")
+        place = own_place(context.scene)
         gone = 0
         with Lock(place.folder, "discarding"):
             for folder in [
                 *place.folder.glob("unfinished-*"),
                 *place.folder.glob("*/unfinished-*"),
             ]:
-                try:
-                    shutil.rmtree(folder)
-                except OSError as e:
-                    raise SceneError(f"{folder} cannot be removed ({e})") from e
+                remove_folder(folder)
                 gone += 1
         paths.forget()
         return f"removed {gone} unfinished captures" if gone else "there is none unfinished"

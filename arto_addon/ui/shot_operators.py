@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import bpy
@@ -16,12 +15,13 @@ from ..relight.looks import show_looks
 from ..shoot import shoot_and_show
 from ..shot import paths
 from ..shot.shot import layer_of
+from ..stage.stage import picture_size
 from ..work import Steps
 from ..world import controls
 from ..world.check import world_of
 from . import state
 from .long_work import LongWork
-from .operators import Quick, can_capture, can_relight, free
+from .operators import Quick, can_capture, can_relight, free, own_place, remove_folder
 
 
 class ARTO_OT_shoot(LongWork):
@@ -64,9 +64,7 @@ class ARTO_OT_set_back(Quick):
         scene.camera = camera
         scene.frame_set(then.frame, subframe=then.subframe or 0.0)
         render = scene.render
-        share = render.resolution_percentage
-        size = render.resolution_x * share // 100, render.resolution_y * share // 100
-        if size != (then.width, then.height):
+        if picture_size(scene) != (then.width, then.height):
             render.resolution_percentage = 100
             render.resolution_x, render.resolution_y = then.width, then.height
         left = then.difference(state.shot_of(scene, layer_of(scene)))
@@ -89,20 +87,14 @@ class ARTO_OT_delete_capture(Quick):
         return context.window_manager.invoke_confirm(self, event)
 
     def work(self, context: bpy.types.Context) -> str:
-        scene = context.scene
-        place = paths.place(scene, layer_of(scene))
-        if place.owner:
-            raise SceneError(f"what is there is of {place.owner}")
+        place = own_place(context.scene)
         if not (place.folder / "field").is_dir():
             raise SceneError("nothing would be left to relight with: fit the capture first")
         with Lock(place.folder, "deleting"):
             for take in ("", "ground", "things"):
                 folder = place.folder / take / "capture"
                 if folder.is_dir():
-                    try:
-                        shutil.rmtree(folder)
-                    except OSError as e:
-                        raise SceneError(f"{folder} cannot be removed ({e})") from e
+                    remove_folder(folder)
         paths.forget()
         return "deleted the capture; the shot can still be relit"
 

@@ -59,7 +59,7 @@ def displayed(pixels: NDArray) -> NDArray[np.float32]:
     h, w = pixels.shape[0] // step * step, pixels.shape[1] // step * step
     blocks = pixels[:h, :w].reshape(h // step, step, w // step, step, -1)
     small = blocks.mean(axis=(1, 3), dtype=np.float64)
-    light = np.maximum(small[..., :3], 0)
+    light = np.maximum(np.nan_to_num(small[..., :3], posinf=0, neginf=0), 0)
     # a picture's middle is a display's, and its lights run out softly
     light = light / (light + 0.6 * max(float(light.mean()), 1e-9) + 0.2)
     alpha = small[..., 3:4] if small.shape[-1] > 3 else np.ones_like(light[..., :1])

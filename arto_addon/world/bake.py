@@ -131,15 +131,6 @@ def _power_of_two(samples: float) -> int:
     return 2 ** round(math.log2(max(SAMPLES, samples)))
 
 
-def _coarser(environment: Environment, scale: int) -> Environment:
-    """A map of so many times fewer texels a side, each the mean over its solid angle."""
-    height, width = environment.image.shape[:2]
-    weights = environment.row_solid_angles.reshape(-1, scale)
-    blocks = environment.image.reshape(height // scale, scale, width // scale, scale, 3)
-    rows = np.einsum("hs,hswtc->hwc", weights / weights.sum(axis=1, keepdims=True), blocks)
-    return Environment((rows / scale).astype(np.float32))
-
-
 @contextmanager
 def _panorama(scene: bpy.types.Scene, world: bpy.types.World) -> Iterator[Any]:
     """A studio with a camera that sees all of a world, as the scene's surfaces see it."""
@@ -215,4 +206,4 @@ def bake(
             image[block.slices] = render_studio(studio)[..., :3] / cosine[rows]
         # which lets go of them
         render.use_persistent_data = False
-    return _coarser(Environment(image), scale)
+    return Environment(image).coarser(scale)

@@ -18,7 +18,7 @@ from arto.arto_addon.stage.settings import samples_of
 from arto.arto_addon.ui import overlay, result_panel, state
 from arto.arto_addon.ui.places import _lines
 from arto.core import exr
-from arto.core.errors import SceneError
+from arto.core.errors import ExrError, SceneError
 from scene_tools import captured, cycles, set_colour, small_scene
 
 LAYER = "ViewLayer"
@@ -91,6 +91,23 @@ def test_verify_agrees_with_its_own_truth_and_finds_what_is_off(ready) -> None:
         assert "Differs by more than noise" in exr.header(path)["arto.verify"]
     finally:
         ready.world.arto.strength = 1.0
+
+
+def test_no_verdict_on_a_plate_that_is_no_number(ready) -> None:
+    """NaN is neither like a render nor unlike it: it must not agree."""
+    path = paths.relit_file(ready)
+    good = path.read_bytes()
+    try:
+        picture = _plate(ready)
+        picture[3, 4, 1] = np.nan
+        exr.write(path, {"": picture})
+        with pytest.raises(SceneError, match="the plate has 1 pixels that are infinite"):
+            work.run(verify_plate(ready))
+        path.write_bytes(good[: len(good) // 2])
+        with pytest.raises(ExrError):
+            work.run(verify_plate(ready))
+    finally:
+        path.write_bytes(good)
 
 
 def test_look_inside(ready) -> None:

@@ -17,7 +17,7 @@ from arto.arto_addon.shot import paths
 from arto.arto_addon.world import kept
 from arto.arto_addon.world.dials import without_dials
 from arto.core import exr
-from arto.core.errors import ArtoError
+from arto.core.errors import ArtoError, SceneError
 from scene_tools import captured, set_colour, small_scene
 
 
@@ -173,6 +173,65 @@ def test_a_map_that_is_on_its_way_is_shown_though_the_hand_moved_on(scene, on) -
         time.sleep(0.02)
     scene.world.arto.tint = (1, 1, 1)
     assert on.viewer.made >= made + 3
+
+
+def _answer(made: maps.Maps, scene, key: str) -> str:
+    """Ask for a map of another tint, by that key -> what went wrong."""
+    assert made.ask(scene, scene.view_layers[0].name, scene.world, key, False)
+    until = time.monotonic() + 60
+    while made.busy:
+        assert time.monotonic() < until
+        time.sleep(0.02)
+    return made.trouble_with(key)
+
+
+def test_a_killed_blender_is_said_and_another_one_is_started(scene) -> None:
+    made = maps.Maps()
+    try:
+        made.start()
+        made._process.kill()
+        made._process.wait(10)
+        # asked of a dead one, or of the next: never waited for without an end
+        first = _answer(made, scene, "one")
+        assert not first or "ended" in first
+        assert _answer(made, scene, "two") == ""
+        assert made.get("two", False) is not None
+        # what failed is not asked for again and again
+        made._failed["three", False] = "why"
+        assert not made.ask(scene, scene.view_layers[0].name, scene.world, "three", False)
+        assert made.trouble_with("three") == "why" and made.trouble_with("two") == ""
+    finally:
+        made.close()
+
+
+def test_no_room_for_the_worlds_file(scene, tmp_path) -> None:
+    """A sentence, and it goes on once there is room again."""
+    made = maps.Maps()
+    folder, made._folder = made._folder, tmp_path / "gone" / "far"
+    try:
+        with pytest.raises(SceneError, match="cannot be written"):
+            made.ask(scene, scene.view_layers[0].name, scene.world, "one", False)
+        assert not made.busy
+        made._folder = folder
+        assert _answer(made, scene, "one") == ""
+    finally:
+        made.close()
+
+
+def test_half_a_map_is_said(scene, monkeypatch) -> None:
+    made = maps.Maps()
+    try:
+        assert _answer(made, scene, "one") == ""
+
+        def half(path):
+            raise EOFError("no data left in file")
+
+        monkeypatch.setattr(maps.np, "load", half)
+        assert "cannot be read" in _answer(made, scene, "two")
+        monkeypatch.undo()
+        assert _answer(made, scene, "three") == ""
+    finally:
+        made.close()
 
 
 def test_nothing_is_left(scene) -> None:

@@ -99,3 +99,11 @@ def test_load_passes_over_parts_without_colour(tmp_path: Path) -> None:
         Environment.load(tmp_path / "grey.exr")
     with pytest.raises(ExrError, match="there is no file"):
         Environment.load(tmp_path / "none.exr")
+
+
+def test_a_coarser_map_has_the_same_light(noisy) -> None:
+    """Texels count by their solid angle: what all directions bring stays, turned or not."""
+    fine = noisy(4, 64)
+    coarse = fine.coarser(4)
+    assert coarse.image.shape == (16, 32, 3)
+    np.testing.assert_allclose(coarse.irradiance(), fine.irradiance(), rtol=1e-5)
