@@ -53,7 +53,7 @@ class Walk:
 
     def __init__(self, opener: Callable[..., Window], blend: Path, folder: Path | None) -> None:
         self._opener, self.blend = opener, blend
-        self.w, self.folder, self.number = opener(blend), folder, 0
+        self.w, self.folder, self.number, self.clicks = opener(blend), folder, 0, 0
 
     def again(self) -> Window:
         """Another window on the same file."""
@@ -94,6 +94,7 @@ class Walk:
         window, one that is being drawn anew may miss a click."""
         for _ in range(4):
             self.w.click(*self.sidebar(down))
+            self.clicks += 1
             end = time.monotonic() + 5
             while time.monotonic() < end:
                 if self.w.get(until):
@@ -295,6 +296,39 @@ def test_an_hour_of_an_artist(walk: Walk, tmp_path: Path, program: Program) -> N
     done = program.run("-b", "--factory-startup", tmp_path / "old.blend")
     assert done.returncode == 0 and "Traceback" not in done.stdout + done.stderr, said(done)
     assert not np.isnan(red).any()
+
+
+DEMO = f"""
+import sys
+sys.path.insert(0, {str(ROOT)!r})
+import bpy
+from bench import scenes, worlds
+
+scene = scenes.product_shot(width=160, height=120)
+worlds.set_world_hdri(scene, "courtyard")
+scene.cycles.samples, scene.cycles.use_adaptive_sampling = 128, False
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[-1])
+"""
+
+
+def test_the_first_picture(walk: Walk, tmp_path: Path, program: Program, capsys) -> None:
+    """From a fresh install on the demo's shot: one click on Capture, and the plate is shown."""
+    w, demo = walk.w, tmp_path / "demo.blend"
+    program.script(DEMO, demo)
+    w.do(f"bpy.ops.wm.open_mainfile(filepath={str(demo)!r}, load_ui=False)")
+    time.sleep(0.5)
+    w.do(ARRANGE)
+    time.sleep(0.5)
+    w.do(TAB)
+    time.sleep(1.0)
+    begun = time.monotonic()
+    walk.press(CAPTURE, "session.current is not None")
+    level, text = w.idle(240)
+    seconds = time.monotonic() - begun
+    assert level == "INFO", text
+    assert w.get("'ARTO Relit' in [s.image.name for s in live.spaces() if s.image]")
+    with capsys.disabled():
+        print(f"\nfirst relit picture (160x120, 128 samples): {walk.clicks} click, {seconds:.1f} s")
 
 
 EVERYWHERE = """

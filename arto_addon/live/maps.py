@@ -172,8 +172,9 @@ class Maps:
                     self._answered(found, said.get("error", ""))
                 except (OSError, ValueError, EOFError, KeyError) as e:
                     self._answered(None, f"the map of the world cannot be read ({e})")
-        # it ended; a world that ends it is not asked for again
-        self._answered(None, "the Blender that makes maps of the world ended: change the world")
+        # a world that ends it is not asked for again; what was asked of the next one is not its
+        if process is self._process:
+            self._answered(None, "the Blender that makes maps of the world ended: change the world")
 
     def _answered(self, found: NDArray[np.float32] | None, error: str) -> None:
         """What was asked for has come, or never will."""
