@@ -20,7 +20,7 @@ from ...core.environment import Environment
 from ...core.region import Region
 from ..blender.nodes import Nodes, new_material, shader_tree, trees
 from ..stage.stage import set_region
-from .check import check_world
+from .check import check_images, check_world
 from .detail import detail
 from .studio import render as render_studio
 from .studio import studio_scene
@@ -134,6 +134,7 @@ def _power_of_two(samples: float) -> int:
 @contextmanager
 def _panorama(scene: bpy.types.Scene, world: bpy.types.World) -> Iterator[Any]:
     """A studio with a camera that sees all of a world, as the scene's surfaces see it."""
+    check_images(world)
     with studio_scene(scene, world, "ARTO World") as (studio, made):
         lens = bpy.data.cameras.new("ARTO Panorama")
         camera = bpy.data.objects.new("ARTO Panorama", lens)

@@ -51,6 +51,21 @@ def check_world(scene: bpy.types.Scene, view_layer: str | None = None) -> bpy.ty
     return world
 
 
+def check_images(world: bpy.types.World) -> None:
+    """Raise SceneError where an image of the world's is there and cannot be read: Cycles shows
+    magenta in its place. It loads them, as a render will."""
+    for tree in trees(shader_tree(world), set()):
+        for node in tree.nodes:
+            image = getattr(node, "image", None)
+            if image is None or not any(o.is_linked for o in node.outputs):
+                continue
+            if image.source in {"FILE", "SEQUENCE", "MOVIE"} and min(image.size) == 0:
+                raise SceneError(
+                    f"the world's image '{image.name}' cannot be read, it is damaged or cut off: "
+                    "copy the file anew, or choose another"
+                )
+
+
 def _fills(socket: bpy.types.NodeSocket) -> bool:
     """Whether what is linked to a volume socket is anything: not muted, not of density 0."""
     link = next((i for i in socket.links if not i.is_muted), None)

@@ -8,11 +8,12 @@ import bpy
 import numpy as np
 import pytest
 from arto.arto_addon.world.background import background
-from arto.arto_addon.world.bake import bake
+from arto.arto_addon.world.bake import bake, rough
 from arto.arto_addon.world.check import differs_by_rays
+from arto.core import exr
 from arto.core.errors import SceneError
 from arto.core.region import Region
-from scene_tools import set_colour
+from scene_tools import set_colour, small_scene
 
 
 def hdri(scene, pixels, rotation=0.0):
@@ -214,3 +215,23 @@ def test_nothing_is_left_behind(scene):
     bake(scene, 64)
     background(scene)
     assert {k: len(getattr(bpy.data, k)) for k in kinds} == before
+
+
+@pytest.mark.parametrize("how", ["full", "rough"])
+def test_an_hdri_that_is_cut_off_is_said(tmp_path, how):
+    """Cycles shows magenta for it, which is a light like any other."""
+    scene = small_scene(tmp_path)
+    path = tmp_path / "half.exr"
+    exr.write(path, {"": np.full((64, 128, 3), 0.5, np.float32)})
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    tree = scene.world.node_tree
+    texture = tree.nodes.new("ShaderNodeTexEnvironment")
+    texture.image = bpy.data.images.load(str(path))
+    tree.links.new(texture.outputs[0], tree.nodes["Background"].inputs["Color"])
+    scenes = len(bpy.data.scenes)
+    with pytest.raises(SceneError, match=r"'half\.exr' cannot be read"):
+        if how == "full":
+            bake(scene, 64)
+        else:
+            rough(scene, 64, scene.world)
+    assert len(bpy.data.scenes) == scenes
