@@ -85,6 +85,31 @@ def set_colour(scene: bpy.types.Scene, colour: tuple[float, float, float], stren
     background.inputs["Strength"].default_value = strength
 
 
+def hdri(scene, pixels, rotation=0.0):
+    """A world with an equirectangular image (rows top-down), turned about the vertical."""
+    height, width = pixels.shape[:2]
+    image = bpy.data.images.new("Sky", width, height, float_buffer=True)
+    image.colorspace_settings.name = "Linear Rec.709"
+    rgba = np.dstack([pixels, np.ones((height, width))]).astype(np.float32)
+    image.pixels.foreach_set(rgba[::-1].ravel())
+    image.pack()
+    tree = scene.world.node_tree
+    texture = tree.nodes.new("ShaderNodeTexEnvironment")
+    texture.image = image
+    mapping = tree.nodes.new("ShaderNodeMapping")
+    mapping.inputs["Rotation"].default_value = (0, 0, rotation)
+    coordinates = tree.nodes.new("ShaderNodeTexCoord")
+    tree.links.new(coordinates.outputs["Generated"], mapping.inputs[0])
+    tree.links.new(mapping.outputs[0], texture.inputs[0])
+    tree.links.new(texture.outputs[0], tree.nodes["Background"].inputs["Color"])
+    return texture
+
+
+def smooth(height=64):
+    v, u = np.mgrid[:height, : 2 * height] / height
+    return np.dstack([1 + np.sin(np.pi * u), v, 0.5 + 0.5 * np.cos(2 * np.pi * u) * v])
+
+
 @contextmanager
 def world_volume(scene: bpy.types.Scene) -> Iterator[None]:
     """The scene's world filled with fog for a while."""
@@ -118,6 +143,13 @@ def cycles(scene: bpy.types.Scene, samples: int, seed: int, folder: Path) -> np.
         work.blocking_render(request)
         request.check()
     return next(iter(exr.read(folder / "cycles.exr").values()))
+
+
+def instance_of(collection, into):
+    empty = bpy.data.objects.new("Instance", None)
+    empty.instance_type, empty.instance_collection = "COLLECTION", collection
+    into.objects.link(empty)
+    return empty
 
 
 def made_by_nodes(thing: bpy.types.Object, maker: bpy.types.Object) -> None:

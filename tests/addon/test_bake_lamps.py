@@ -10,8 +10,7 @@ from arto.arto_addon.blender.nodes import Nodes
 from arto.arto_addon.world.bake import bake
 from arto.arto_addon.world.detail import FINEST, detail
 from arto.core.environment import Environment, directions
-from scene_tools import set_colour
-from test_world import hdri, smooth
+from scene_tools import hdri, set_colour, smooth
 
 RADIANCE = 1e5
 

@@ -22,7 +22,7 @@ from arto.arto_addon.world.background import background
 from arto.arto_addon.world.check import check_world
 from arto.arto_addon.world.detail import detail
 from scene_tools import assert_as_cycles, captured, set_colour, small_scene
-from test_relight import run_all
+from shot_tools import run_all
 
 without_nodes = pytest.mark.skipif(FIVE, reason="from Blender 5 on there is no Use Nodes")
 

@@ -13,9 +13,8 @@ from arto.arto_addon.relight import relight
 from arto.arto_addon.stage.stage import picture_region, stage
 from arto.arto_addon.world.background import background
 from arto.core import exr
-from scene_tools import small_scene
-from test_relight import run_all
-from test_world import hdri, smooth
+from scene_tools import hdri, small_scene, smooth
+from shot_tools import run_all
 
 
 def own_picture(scene, samples, folder, seed=1, empty=False):

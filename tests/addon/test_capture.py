@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from arto.arto_addon import fit, work
 from arto.arto_addon.capture import capture, planned
-from arto.arto_addon.shot import paths, status
+from arto.arto_addon.shot import status
 from arto.arto_addon.stage.stage import picture_region
 from arto.core import exr
 from arto.core.basis_images import GROUP
@@ -26,6 +26,7 @@ from scene_tools import (
     snapshot,
     world_volume,
 )
+from shot_tools import unfinished
 
 
 @pytest.mark.parametrize("route", ["pattern", "single"])
@@ -147,11 +148,6 @@ def _interrupt_after(steps, renders):
                 continue
             work.blocking_render(step)
             done += long
-
-
-def unfinished(scene):
-    """The folders of captures of the scene's shot that were stopped."""
-    return sorted(paths.place(scene).folder.glob("unfinished-*"))
 
 
 def test_cancelled_scene_is_as_before_and_goes_on(tmp_path, monkeypatch):

@@ -12,7 +12,7 @@ from arto.arto_addon.blender.output import float_exr
 from arto.arto_addon.capture import capture, room
 from arto.arto_addon.capture.sequence import capture_frames
 from arto.arto_addon.farm.plan import plan
-from arto.arto_addon.relight import plate, relight
+from arto.arto_addon.relight import plate
 from arto.arto_addon.relight.many import relight_many
 from arto.arto_addon.relight.present import present_frames
 from arto.arto_addon.shot import paths
@@ -26,29 +26,15 @@ from scene_tools import (
     captured,
     composited,
     differences,
+    hdri,
     in_compositor,
+    instance_of,
     made_by_nodes,
     set_colour,
-    small_scene,
+    smooth,
     snapshot,
 )
-from test_checks import instance_of
-from test_world import hdri, smooth
-
-
-def with_catcher(tmp_path, samples=256, patches=4):
-    scene = small_scene(tmp_path)
-    scene.objects["Floor"].is_shadow_catcher = True
-    scene.render.film_transparent = True
-    scene.arto.samples, scene.arto.patches, scene.arto.keep = samples, patches, "never"
-    hdri(scene, smooth())
-    return scene
-
-
-def relit(scene) -> tuple[np.ndarray, np.ndarray]:
-    """The plate (H, W, 4), and how much is seen of what is behind it (H, W, 3)."""
-    path, _ = work.run(relight.relight(scene))
-    return exr.read(path)[""], exr.read(plate.share_file(path))[""]
+from shot_tools import relit_and_share, with_catcher
 
 
 def cycles_catcher(scene, samples, seed, tmp_path, share=True) -> np.ndarray:
@@ -79,7 +65,7 @@ def test_as_cycles_own_catcher(tmp_path):
     their shadows, each to within what two of Cycles' own renders differ by and a little."""
     scene = with_catcher(tmp_path, samples=512)
     captured(scene)
-    picture, share = relit(scene)
+    picture, share = relit_and_share(scene)
     first, second = (cycles_catcher(scene, 512, s, tmp_path) for s in (1, 2))
     one, two = (cycles_catcher(scene, 512, s, tmp_path, share=False) for s in (1, 2))
     bare = bare_of(scene)
@@ -99,7 +85,7 @@ def test_without_things_the_footage_passes(tmp_path):
     for name in ("Matt", "Glossy"):
         scene.objects[name].hide_render = True
     captured(scene)
-    picture, share = relit(scene)
+    picture, share = relit_and_share(scene)
     np.testing.assert_allclose(share, 1, atol=1e-4)
     np.testing.assert_allclose(picture, 0, atol=1e-4)
 
@@ -127,7 +113,7 @@ def test_however_a_catcher_comes_into_the_scene(tmp_path, how):
     """In an instance of an instance, in a linked file, made by geometry nodes: one share of all."""
     scene = with_catcher(tmp_path, samples=16, patches=1)
     captured(scene)
-    _, expected = relit(scene)
+    _, expected = relit_and_share(scene)
     floor = scene.objects["Floor"]
     kept, outer = bpy.data.collections.new("Kept"), bpy.data.collections.new("Outer")
     scene.collection.objects.unlink(floor)
@@ -145,7 +131,7 @@ def test_however_a_catcher_comes_into_the_scene(tmp_path, how):
     else:
         made_by_nodes(floor, add_mesh(scene, "Maker", [], []))
     captured(scene)
-    _, share = relit(scene)
+    _, share = relit_and_share(scene)
     np.testing.assert_allclose(share, expected, atol=0.02)
 
 
@@ -190,18 +176,18 @@ def test_stopped_between_takes_it_goes_on(tmp_path, monkeypatch):
             Field(paths.field_folder(scene))
     run(1)
     assert len(renders) == 3 and len(set(renders)) == 3
-    picture, share = relit(scene)
+    picture, share = relit_and_share(scene)
     assert picture.shape[:2] == share.shape[:2]
 
 
 def test_kept_images_fit_to_the_same(tmp_path):
     scene = with_catcher(tmp_path, samples=8, patches=1)
     captured(scene)
-    expected = relit(scene)
+    expected = relit_and_share(scene)
     scene.arto.keep = "always"
     captured(scene)
     work.run(fit.fit(scene))
-    for one, two in zip(relit(scene), expected, strict=True):
+    for one, two in zip(relit_and_share(scene), expected, strict=True):
         np.testing.assert_allclose(one, two, atol=1e-6)
 
 
@@ -215,7 +201,7 @@ def test_takes_of_two_captures_are_not_mixed(tmp_path):
     beside.rename(tmp_path / "new")
     (tmp_path / "old").rename(beside)
     with pytest.raises(FieldError, match="run Capture again"):
-        relit(scene)
+        relit_and_share(scene)
 
 
 def test_lamps_of_the_world_fall_on_both(tmp_path):
@@ -226,7 +212,7 @@ def test_lamps_of_the_world_fall_on_both(tmp_path):
     hdri(scene, image)
     scene.arto.lamps, scene.arto.lamp_samples = True, 256
     captured(scene)
-    _, share = relit(scene)
+    _, share = relit_and_share(scene)
     first, second = (cycles_catcher(scene, 512, s, tmp_path) for s in (1, 2))
     bare = bare_of(scene)
     noise = np.abs(first - second)[bare].mean()
@@ -239,7 +225,7 @@ def test_opaque_film_shows_the_world_in_shadow(tmp_path):
     set_colour(scene, (1, 1, 1))
     scene.render.film_transparent = False
     captured(scene)
-    picture, _ = relit(scene)
+    picture, _ = relit_and_share(scene)
     one, two = (cycles_catcher(scene, 512, s, tmp_path, share=False) for s in (1, 2))
     assert (picture[..., 3] == 1).all()
     noise = np.abs(one - two)[..., :3].mean()
@@ -256,7 +242,7 @@ def test_names_of_shapes(tmp_path):
     box.visible_diffuse = box.visible_shadow = box.visible_camera = False
     box.visible_glossy = box.visible_transmission = False
     captured(scene)
-    _, share = relit(scene)
+    _, share = relit_and_share(scene)
     np.testing.assert_allclose(share, 1, atol=0.05)
 
 
@@ -299,7 +285,7 @@ def test_an_earlier_capture_stays_whole_until_the_new_one_is(tmp_path):
     """Stopped in its last take, a new capture has replaced nothing of the old one."""
     scene = with_catcher(tmp_path, samples=4, patches=1)
     captured(scene)
-    expected = relit(scene)
+    expected = relit_and_share(scene)
     scene.arto.samples = 5
     count = 0
     steps = capture.capture(scene, scene.view_layers[0].name)
@@ -310,11 +296,11 @@ def test_an_earlier_capture_stays_whole_until_the_new_one_is(tmp_path):
                 break
             work.blocking_render(step)
     steps.close()
-    for one, two in zip(relit(scene), expected, strict=True):
+    for one, two in zip(relit_and_share(scene), expected, strict=True):
         np.testing.assert_array_equal(one, two)
     captured(scene)
     assert Field(paths.field_folder(scene)).about["samples"] == 5
-    relit(scene)
+    relit_and_share(scene)
     # and without the catcher, there is one take again
     scene.objects["Floor"].is_shadow_catcher = False
     captured(scene)

@@ -17,9 +17,8 @@ from arto.core.catcher import catch
 from arto.core.environment import Environment
 from arto.core.field import Field
 from arto.core.light import PatchLight
-from scene_tools import add_mesh, captured, cycles, material, set_colour, small_scene
-from test_catcher import footage_of
-from test_world import hdri, smooth
+from scene_tools import add_mesh, captured, cycles, hdri, material, set_colour, small_scene, smooth
+from shot_tools import footage_of
 
 
 def on_white_ground(tmp_path, things=True):

@@ -8,7 +8,7 @@ from arto.arto_addon.stage.bounds import rendered
 from arto.arto_addon.stage.stage import stage
 from arto.arto_addon.world.check import check_no_volume
 from arto.core.errors import SceneError
-from scene_tools import BOX, add_mesh, made_by_nodes
+from scene_tools import BOX, add_mesh, instance_of, made_by_nodes
 
 
 def catchers(scene):
@@ -22,13 +22,6 @@ def a_catcher(scene, collection):
     scene.collection.objects.unlink(thing)
     collection.objects.link(thing)
     return thing
-
-
-def instance_of(collection, into):
-    empty = bpy.data.objects.new("Instance", None)
-    empty.instance_type, empty.instance_collection = "COLLECTION", collection
-    into.objects.link(empty)
-    return empty
 
 
 def test_catcher_in_an_instance_of_an_instance(scene):

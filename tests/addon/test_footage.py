@@ -19,20 +19,7 @@ from scene_tools import (
     composited,
     in_compositor,
 )
-from test_catcher import relit, with_catcher
-
-
-def footage_of(scene, tmp_path, colour=(0.25, 0.5, 0.75)):
-    """An 8-bit picture behind the camera, of the picture's size."""
-    image = bpy.data.images.new("Filmed", 24, 18)
-    image.pixels.foreach_set(np.tile(np.float32([*colour, 1]), 24 * 18))
-    image.filepath_raw, image.file_format = str(tmp_path / "filmed.png"), "PNG"
-    image.save()
-    image = bpy.data.images.load(str(tmp_path / "filmed.png"))
-    camera = scene.camera.data
-    camera.show_background_images = True
-    camera.background_images.new().image = image
-    return image
+from shot_tools import footage_of, relit_and_share, with_catcher
 
 
 def test_footage_is_put_behind_in_its_colour_space(tmp_path):
@@ -40,14 +27,14 @@ def test_footage_is_put_behind_in_its_colour_space(tmp_path):
     scene = with_catcher(tmp_path, samples=8, patches=1)
     image = footage_of(scene, tmp_path)
     captured(scene)
-    picture, share = relit(scene)
+    picture, share = relit_and_share(scene)
     comp = exr.read(plate.comp_file(paths.relit_file(scene)))[""]
     encoded = np.array([64, 128, 191]) / 255
     linear = ((encoded + 0.055) / 1.055) ** 2.4
     np.testing.assert_allclose(comp, picture[..., :3] + share * linear, atol=2e-3)
     image.filepath = str(tmp_path / "gone.png")
     with pytest.raises(SceneError, match="find it"):
-        relit(scene)
+        relit_and_share(scene)
 
 
 def test_the_setting_goes_before_the_camera_and_a_moved_background_is_said(tmp_path):
@@ -56,13 +43,13 @@ def test_the_setting_goes_before_the_camera_and_a_moved_background_is_said(tmp_p
     captured(scene)
     scene.camera.data.background_images[0].scale = 2.0
     with pytest.raises(SceneError, match="scaled"):
-        relit(scene)
+        relit_and_share(scene)
     grey = bpy.data.images.new("Grey", 48, 36, float_buffer=True)
     grey.pixels.foreach_set(np.full(48 * 36 * 4, 0.5, np.float32))
     grey.pack()
     grey.colorspace_settings.name = working_space()
     scene.arto.footage = grey
-    picture, share = relit(scene)
+    picture, share = relit_and_share(scene)
     comp = exr.read(plate.comp_file(paths.relit_file(scene)))[""]
     np.testing.assert_allclose(comp, picture[..., :3] + 0.5 * share, atol=1e-5)
 
@@ -71,7 +58,7 @@ def test_the_group_puts_footage_behind(tmp_path):
     """The plate's node group, in Blender's compositor, gives what the core's arithmetic gives."""
     scene = with_catcher(tmp_path, samples=8, patches=1)
     captured(scene)
-    picture, share = relit(scene)
+    picture, share = relit_and_share(scene)
     node = in_compositor(scene, bpy.data.node_groups["ARTO Relit"], "Composite")
     node.inputs["Footage"].default_value = (0.2, 0.4, 0.6, 1)
     found = composited(scene, tmp_path)[..., :3]
@@ -114,7 +101,7 @@ def test_light_can_be_added_instead(tmp_path):
     grey.pixels.foreach_set(rgba[::-1].ravel())
     grey.pack()
     scene.arto.footage, scene.arto.shadows = grey, "ADD"
-    relit(scene)
+    relit_and_share(scene)
     comp = exr.read(plate.comp_file(path))[""]
     np.testing.assert_allclose(comp, whole[..., :3], atol=2e-3)
     assert plate.light_file(path).is_file()
@@ -161,5 +148,5 @@ def test_footage_that_is_no_picture_is_said_before_anything_is_written(tmp_path,
     scene.arto.footage = bpy.data.images.load(str(path))
     scenes = len(bpy.data.scenes)
     with pytest.raises(SceneError, match=match):
-        relit(scene)
+        relit_and_share(scene)
     assert not paths.relit_file(scene).exists() and len(bpy.data.scenes) == scenes

@@ -20,8 +20,15 @@ from arto.arto_addon.shot import paths
 from arto.core import cryptomatte, exr
 from arto.core.errors import ExrError, SceneError
 from arto.core.field import Field
-from scene_tools import assert_as_cycles, captured, composited, in_compositor, small_scene
-from test_world import hdri, smooth
+from scene_tools import (
+    assert_as_cycles,
+    captured,
+    composited,
+    hdri,
+    in_compositor,
+    small_scene,
+    smooth,
+)
 
 
 @pytest.fixture

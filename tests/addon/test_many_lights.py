@@ -18,8 +18,7 @@ from arto.core import exr
 from arto.core.errors import CaptureSetError, SceneError
 from arto.core.hemicube import Hemicube
 from arto.core.light import PatchLight
-from scene_tools import captured, small_scene
-from test_world import hdri, smooth
+from scene_tools import captured, hdri, small_scene, smooth
 
 
 @pytest.fixture

@@ -15,8 +15,7 @@ from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import scene_id
 from arto.core import exr
 from arto.core.metrics import mean_relative_error
-from scene_tools import captured, cycles
-from test_world import hdri, smooth
+from scene_tools import captured, cycles, hdri, smooth
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = Path(os.environ.get("ARTO_SCENES") or ROOT.parent / "shared" / "scenes")

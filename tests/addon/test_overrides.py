@@ -12,7 +12,7 @@ from arto.arto_addon.world.background import background
 from arto.arto_addon.world.bake import bake
 from arto.core import exr
 from scene_tools import assert_as_cycles, material, set_colour, small_scene
-from test_relight import run_all
+from shot_tools import run_all
 
 
 def world_of_colour(colour):

@@ -23,24 +23,15 @@ from scene_tools import (
     captured,
     cycles,
     differences,
+    hdri,
     material,
     set_colour,
     small_scene,
+    smooth,
     snapshot,
     world_volume,
 )
-from test_world import hdri, smooth
-
-
-def run_all(scene, out=None):
-    captured(scene)
-    work.run(fit.fit(scene))
-    return relit(scene)
-
-
-def relit(scene):
-    path, _ = work.run(relight.relight(scene))
-    return exr.read(path)[""]
+from shot_tools import relit, run_all
 
 
 def transparent(scene):

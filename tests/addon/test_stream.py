@@ -14,7 +14,7 @@ from arto.core.capture_set import CaptureSet
 from arto.core.errors import CaptureSetError, PatternError, SceneError
 from arto.core.field import Field
 from scene_tools import small_scene
-from test_capture import unfinished
+from shot_tools import unfinished
 
 
 def arrays(folder):

@@ -13,7 +13,7 @@ from arto.arto_addon.shot import paths
 from arto.core import exr
 from arto.core.errors import ExrError
 from scene_tools import captured, composited, in_compositor
-from test_catcher import footage_of, with_catcher
+from shot_tools import footage_of, with_catcher
 
 
 @pytest.fixture

@@ -13,32 +13,7 @@ from arto.arto_addon.world.check import differs_by_rays
 from arto.core import exr
 from arto.core.errors import SceneError
 from arto.core.region import Region
-from scene_tools import set_colour, small_scene
-
-
-def hdri(scene, pixels, rotation=0.0):
-    """A world with an equirectangular image (rows top-down), turned about the vertical."""
-    height, width = pixels.shape[:2]
-    image = bpy.data.images.new("Sky", width, height, float_buffer=True)
-    image.colorspace_settings.name = "Linear Rec.709"
-    rgba = np.dstack([pixels, np.ones((height, width))]).astype(np.float32)
-    image.pixels.foreach_set(rgba[::-1].ravel())
-    image.pack()
-    tree = scene.world.node_tree
-    texture = tree.nodes.new("ShaderNodeTexEnvironment")
-    texture.image = image
-    mapping = tree.nodes.new("ShaderNodeMapping")
-    mapping.inputs["Rotation"].default_value = (0, 0, rotation)
-    coordinates = tree.nodes.new("ShaderNodeTexCoord")
-    tree.links.new(coordinates.outputs["Generated"], mapping.inputs[0])
-    tree.links.new(mapping.outputs[0], texture.inputs[0])
-    tree.links.new(texture.outputs[0], tree.nodes["Background"].inputs["Color"])
-    return texture
-
-
-def smooth(height=64):
-    v, u = np.mgrid[:height, : 2 * height] / height
-    return np.dstack([1 + np.sin(np.pi * u), v, 0.5 + 0.5 * np.cos(2 * np.pi * u) * v])
+from scene_tools import hdri, set_colour, small_scene, smooth
 
 
 def test_plain_colour_with_strength(scene):

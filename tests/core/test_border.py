@@ -63,6 +63,15 @@ def test_every_module_is_small_and_documented(module: Path) -> None:
     assert ast.get_docstring(ast.parse(text))
 
 
+TESTS = sorted((CORE.parent / "tests").rglob("test_*.py"))
+
+
+@pytest.mark.parametrize("module", TESTS, ids=lambda m: m.stem)
+def test_no_test_module_leans_on_another(module: Path) -> None:
+    """What tests share is in the `_tools` beside them: a test that moves then breaks no other."""
+    assert not {name for name in imported(module) if name.startswith("test_")}
+
+
 def test_the_house_is_as_the_architecture_says() -> None:
     """Every folder of the add-on and every module of the core is named there."""
     said = (CORE.parent / "docs" / "architecture.md").read_text()
