@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import bpy
 import numpy as np
 from arto.arto_addon import fit, work
+from arto.arto_addon.farm.job import Job
+from arto.arto_addon.farm.plan import plan
 from arto.arto_addon.relight import plate, relight
 from arto.arto_addon.shot import paths
 from arto.core import exr
@@ -53,3 +58,27 @@ def footage_of(scene, tmp_path, colour=(0.25, 0.5, 0.75)):
     camera.show_background_images = True
     camera.background_images.new().image = image
     return image
+
+
+def planned_job(
+    scene: bpy.types.Scene,
+    folder: Path,
+    frames: Sequence[int] | None = (1,),
+    tiles: int = 2,
+    seeds: int = 1,
+) -> Job:
+    """A farm's job of a scene that was saved."""
+    work.run(plan(scene, scene.view_layers[0].name, folder, frames, tiles, seeds))
+    return Job(folder)
+
+
+def arrays(folder: Path) -> dict[str, np.ndarray]:
+    """All that a field has, or several, by the names of its files."""
+    return {str(p.relative_to(folder)): np.load(p) for p in folder.rglob("*.npy")}
+
+
+def assert_same(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> None:
+    """Bit for bit."""
+    assert one.keys() == other.keys() and one
+    for name, array in one.items():
+        np.testing.assert_array_equal(array, other[name], err_msg=name)

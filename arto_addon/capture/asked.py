@@ -53,7 +53,8 @@ def geometry(scene: bpy.types.Scene, seen: Rendered) -> Hemicube:
 class Asked:
     """A capture that was asked for, on its stage. hemicube: before it is refined; key: the same for
     the very same capture alone; decides: what of it goes into the description; catchers: whether
-    there are shadow catchers, see `takes`."""
+    there are shadow catchers, see `takes`; otherwise: the objects that the take has otherwise than
+    the artist."""
 
     scene: bpy.types.Scene
     view_layer: str
@@ -66,6 +67,7 @@ class Asked:
     key: str
     decides: dict[str, Any]
     catchers: bool
+    otherwise: list[bpy.types.Object]
 
 
 @contextmanager
@@ -79,7 +81,7 @@ def asked(
     with ExitStack() as held:
         on = held.enter_context(stage(scene, view_layer))
         seen = rendered(on)
-        held.enter_context(take(seen, name))
+        otherwise = held.enter_context(take(seen, name))
         hemicube = given.hemicube if given else geometry(scene, seen)
         # between renders the paths differ, and grain would not be theirs
         grain = settings.grain and settings.route == "all"
@@ -120,8 +122,9 @@ def asked(
         key = hashlib.sha256(json.dumps(everything, sort_keys=True).encode()).hexdigest()[:16]
         catchers = bool(seen.catchers)
         yield Asked(
-            scene, view_layer, on, hemicube, region, grain, shot, found, key, decides, catchers
-        )
+            scene, view_layer, on, hemicube, region, grain, shot, found, key, decides, catchers,
+            otherwise,
+        )  # fmt: skip
 
 
 def begun(

@@ -14,8 +14,9 @@ from ...core.field import proxy_folder
 from ...core.files import PART, Lock
 from ...core.fit import fit_into
 from ...core.proxy import FACTORS
+from ..capture.beside import TAKES
 from ..capture.capture import check_file, plan_of
-from ..capture.resume import finish, finish_field, let_go
+from ..capture.resume import empty, finish, finish_field, let_go
 from ..capture.stream import Stream
 from ..relight.denoise import cleaned
 from ..shot import paths
@@ -25,15 +26,22 @@ from .job import Job, Part
 
 
 def gather(job_folder: Path) -> Steps:
-    """Join the parts of a job: the field of each frame takes the place of its shot's; returns the
-    fields' folders.
+    """Join the parts of a job: the field of each frame takes the place of its shot's, and so do
+    those of its takes; returns the folders of the frames' fields.
 
     Seeds are averaged by their samples, light by light. Raises FarmError, naming what is missing;
     then nothing has changed.
     """
     job = Job(job_folder)
-    sets = {frame: job.set_of(frame) for frame in job.frames if not _gathered(job, frame)}
-    found = {p: _found(job, p, sets[p.frame]) for p in job.parts if p.frame in sets}
+    sets = {
+        (frame, take): job.set_of(frame, take)
+        for frame in job.frames
+        for take in job.takes(frame)
+        if not _gathered(job, frame, take)
+    }
+    found = {
+        p: _found(job, p, sets[p.frame, p.take]) for p in job.parts if (p.frame, p.take) in sets
+    }
     missing = [p for p, there in found.items() if there is None]
     if missing:
         numbers = ", ".join(str(p.number) for p in missing[:20])
@@ -45,14 +53,21 @@ def gather(job_folder: Path) -> Steps:
     with job.scene() as (scene, view_layer):
         for i, frame in enumerate(job.frames):
             yield Progress(i / len(job.frames), f"gathering frame {frame}")
-            scene.frame_set(frame)
-            scene.view_layers[view_layer].update()
+            job.go_to(scene, frame)
             claimed = paths.claim(scene, view_layer)
+            left = [take for take in job.takes(frame) if (frame, take) in sets]
             with Lock(claimed, f"gathering {shot_of(scene, view_layer).title}"):
-                if frame in sets:
-                    parts = {p: t for p, t in found.items() if p.frame == frame and t is not None}
-                    yield from _joined(job, frame, parts)
-                    yield from _placed(scene, job.set_folder(frame), claimed)
+                for take in left:
+                    parts = {
+                        p: t for p, t in found.items() if t and (p.frame, p.take) == (frame, take)
+                    }
+                    yield from _joined(job, frame, take, parts)
+                # as `capture` ends: all together, the first take last
+                for take in reversed(left):
+                    yield from _placed(scene, job.set_folder(frame, take), claimed / take)
+                if left and frame not in job.catchers:
+                    for take in TAKES:
+                        empty(claimed / take)
             folders.append(claimed / "field")
     paths.forget()
     for partial in (job.folder / "parts").glob("*" + PART):
@@ -61,9 +76,9 @@ def gather(job_folder: Path) -> Steps:
     return folders
 
 
-def _gathered(job: Job, frame: int) -> bool:
-    """Whether a frame's capture set has gone to its shot."""
-    return not job.set_folder(frame).is_dir()
+def _gathered(job: Job, frame: int, take: str) -> bool:
+    """Whether the capture set of a take of a frame has gone to its shot."""
+    return not job.set_folder(frame, take).is_dir()
 
 
 def _found(job: Job, part: Part, captured: CaptureSet) -> dict[str, Any] | None:
@@ -83,21 +98,23 @@ def _found(job: Job, part: Part, captured: CaptureSet) -> dict[str, Any] | None:
         except ArtoError as e:
             raise FarmError(f"{e}: render part {part.number} again") from e
         files.append(rendered[-1].name)
-    return {"files": files, "samples": job.settings["samples"], "loose": True}
+    return {"files": files, "samples": job.samples_of(captured.head), "loose": True}
 
 
-def _joined(job: Job, frame: int, parts: dict[Part, dict[str, Any]]) -> Steps:
-    """Take the parts of a frame into its capture set, tile by tile, and fit what is not yet."""
-    folder = job.set_folder(frame)
-    head = job.set_of(frame).head
+def _joined(job: Job, frame: int, take: str, parts: dict[Part, dict[str, Any]]) -> Steps:
+    """Take the parts of a take of a frame into its capture set, tile by tile, and fit what is not
+    yet."""
+    folder = job.set_folder(frame, take)
+    head = job.set_of(frame, take).head
+    samples = job.seeds * job.samples_of(head)
+    title = f"frame {frame}, {take}" if take else f"frame {frame}"
     for tile in range(job.tiles):
         entry = head["tiles"][tile]
         some = [(p, t) for p, t in parts.items() if p.tile == tile]
-        yield Progress(tile / job.tiles, f"frame {frame}: tile {tile + 1} of {job.tiles}")
+        yield Progress(tile / job.tiles, f"{title}: tile {tile + 1} of {job.tiles}")
         if not entry["done"]:
             _take(job, folder, entry, some)
-            total = sum(samples for samples, _ in entry.get("seeds", ())) or head["samples"]
-            head["samples"] = total
+            head["samples"] = samples
             write_header(folder, head)
         if not head["kept"] and "fitted" not in entry:
             captured = CaptureSet(folder, unfinished=True)
@@ -151,10 +168,24 @@ def _fit(captured: CaptureSet, tile: int, tiles: int) -> Steps:
         yield Progress((tile + share) / tiles, f"fitting tile {tile + 1} of {tiles}")
 
 
-def _placed(scene: bpy.types.Scene, folder: Path, claimed: Path) -> Steps:
-    """Put a frame's complete capture set, and its field, where the shot's last ones are."""
-    head = CaptureSet(folder).head
+def _placed(scene: bpy.types.Scene, folder: Path, place: Path) -> Steps:
+    """Put a complete capture set, and its field, where the shot's last ones are."""
+    try:
+        place.mkdir(exist_ok=True)
+        near = folder
+        if folder.stat().st_dev != place.stat().st_dev:
+            # folders are put in each other's place on one disk alone; the job's go last, so that
+            # who was killed does it again
+            near = place / (folder.name + PART)
+            shutil.rmtree(near, ignore_errors=True)
+            yield Progress(0.99, f"copying {folder.name} to {place}")
+            shutil.copytree(folder, near)
+    except OSError as e:
+        raise FarmError(f"{place} cannot be written ({e}): make room, and gather again") from e
+    head = CaptureSet(near).head
     if not head["kept"]:
-        finish_field(folder, claimed / "field", head)
-        yield from cleaned(scene, claimed / "field")
-    finish(folder, claimed / "capture")
+        finish_field(near, place / "field", head)
+        yield from cleaned(scene, place / "field")
+    finish(near, place / "capture")
+    if near != folder:
+        shutil.rmtree(folder)

@@ -1,7 +1,8 @@
 """A farm's job: a folder that says what is to be rendered, and takes what was.
 
-`job.json` says what; `frame_<n>/` is the capture set of each frame, with no tile rendered yet; a
-part is `parts/part_<i>/`, there whole or not at all.
+`job.json` says what; `frame_<n>/` is the capture set of each frame, with no tile rendered yet, and
+beside it those of its other takes, where there are shadow catchers; a part is `parts/part_<i>/`,
+there whole or not at all.
 """
 
 from __future__ import annotations
@@ -20,30 +21,47 @@ from ...core.capture_set import CaptureSet
 from ...core.description import Description
 from ...core.errors import FarmError
 from ...core.files import write_text
+from ..capture.beside import TAKES
 from ..capture.sequence import frame_kept
 from ..shot import home
+from ..stage.settings import samples_told
+from ..stage.takes import WHOLE
 
-VERSION = 1
+# Version 1 knows no takes beside the first, and so has none.
+VERSION = 2
+READABLE = (1, VERSION)
 HEADER = "job.json"
 PART_HEADER = "part.json"
 MOST = 1_000_000
-# What of ARTO's settings is where files are on a machine.
-_PLACES = {"folder", "output", "look"}
+# What of ARTO's settings a capture reads, its fit and the denoising of its guides; not where files
+# are on a machine. A preset sets faces, and samples the quality: they come before what they set.
+SETTINGS = (
+    "preset", "faces", "half_sides", "patches", "adaptive", "align", "rotation", "far", "size",
+    "samples", "quality", "patterns", "grain", "route", "seed", "memory", "keep", "keep_limit",
+    "support", "separate", "denoise",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Part:
     """number: in the job; frame; tile: of the frame's capture set; seed: 0 for the first of the
-    job's seeds, and so on."""
+    job's seeds, and so on; take: see `stage.takes`."""
 
     number: int
     frame: int
     tile: int
     seed: int
+    take: str = WHOLE
 
     @property
     def name(self) -> str:
         return f"part_{self.number:04d}"
+
+    def to_json(self) -> dict[str, Any]:
+        said = dict(vars(self))
+        if self.take == WHOLE:
+            del said["take"]
+        return said
 
 
 class Job:
@@ -55,7 +73,7 @@ class Job:
         if not path.is_file():
             raise FarmError(f"there is no job in {folder}: run --command arto plan first")
         said = Description(path, lambda text: FarmError(f"{text}: plan again"))
-        if said.data.get("version") != VERSION:
+        if said.data.get("version") not in READABLE:
             raise said.wrong("version", said.data.get("version"))
         self.scene_name = str(said.kind("scene", str, ""))
         self.view_layer = str(said.kind("view_layer", str, ""))
@@ -66,14 +84,28 @@ class Job:
         if not frames or any(type(f) is not int for f in frames):
             raise said.wrong("frames", frames)
         self.frames: list[int] = frames
+        self.subframe = said.number("subframe", 0.0)
+        # the frames that show some
+        catchers = said.kind("catchers", list, [])
+        if any(type(f) is not int or f not in frames for f in catchers):
+            raise said.wrong("catchers", catchers)
+        self.catchers: set[int] = set(catchers)
         self.tiles = said.whole("tiles", 1, MOST)
-        if len(frames) * self.tiles * self.seeds > MOST:
+        if sum(len(self.takes(f)) for f in frames) * self.tiles * self.seeds > MOST:
             raise said.wrong("tiles", self.tiles)
+
+    def takes(self, frame: int) -> tuple[str, ...]:
+        """The names of a frame's takes, that of everything first."""
+        return (WHOLE, *TAKES) if frame in self.catchers else (WHOLE,)
 
     @property
     def parts(self) -> list[Part]:
         every = [
-            (f, t, s) for f in self.frames for t in range(self.tiles) for s in range(self.seeds)
+            (frame, tile, seed, take)
+            for frame in self.frames
+            for take in self.takes(frame)
+            for tile in range(self.tiles)
+            for seed in range(self.seeds)
         ]
         return [Part(i, *each) for i, each in enumerate(every)]
 
@@ -84,15 +116,29 @@ class Job:
             raise FarmError(f"there is no part {number}: {self.folder} has 0 to {len(parts) - 1}")
         return parts[number]
 
-    def set_folder(self, frame: int) -> Path:
-        return self.folder / f"frame_{frame:04d}"
+    def set_folder(self, frame: int, take: str) -> Path:
+        return set_folder(self.folder, frame, take)
 
-    def set_of(self, frame: int) -> CaptureSet:
-        """The capture set of a frame, unfinished. Raises FarmError, CaptureSetError."""
-        found = CaptureSet(self.set_folder(frame), unfinished=True)
+    def set_of(self, frame: int, take: str) -> CaptureSet:
+        """The capture set of a take of a frame, unfinished. Raises FarmError, CaptureSetError."""
+        found = CaptureSet(self.set_folder(frame, take), unfinished=True)
         if len(found.regions) != self.tiles:
             raise FarmError(f"{found.folder} has not the job's {self.tiles} tiles: plan again")
+        if found.head.get("take", WHOLE) != take:
+            raise FarmError(f"{found.folder} is not of the take '{take}': plan again")
         return found
+
+    def samples_of(self, head: dict[str, Any]) -> int:
+        """How many samples a part has. Once a tile is gathered, its set's description says those of
+        all seeds."""
+        gathered = any(entry["done"] for entry in head["tiles"])
+        return head["samples"] // self.seeds if gathered else head["samples"]
+
+    def go_to(self, scene: bpy.types.Scene, frame: int) -> None:
+        """Bring the scene to a frame as it was planned."""
+        scene.frame_set(frame, subframe=self.subframe)
+        # whatever a script has moved is where it should be
+        scene.view_layers[self.view_layer].update()
 
     def part_folder(self, part: Part) -> Path:
         return self.folder / "parts" / part.name
@@ -104,7 +150,7 @@ class Job:
         if not path.is_file():
             return None
         said = Description(path, lambda text: FarmError(f"{text}: render that part again"))
-        if said.data.get("key") != key or said.data.get("part") != vars(part):
+        if said.data.get("key") != key or said.data.get("part") != part.to_json():
             raise FarmError(
                 f"{path.parent} was rendered from another scene, or for another plan: remove it, "
                 "and render that part again"
@@ -133,24 +179,29 @@ class Job:
                 _set(scene, before)
 
 
+def set_folder(folder: Path, frame: int, take: str) -> Path:
+    """Where in a job's folder the capture set of a take of a frame is."""
+    return folder / (f"frame_{frame:04d}" + (f"_{take}" if take else ""))
+
+
 def _set(scene: bpy.types.Scene, settings: dict[str, Any]) -> None:
-    for name, value in settings.items():
+    for name in settings:
         if name not in scene.arto.bl_rna.properties:
             raise FarmError(f"this ARTO has no setting '{name}': use the one that planned")
-        setattr(scene.arto, name, set(value) if isinstance(value, list) else value)
+    for name in SETTINGS:
+        if name in settings:
+            value = settings[name]
+            setattr(scene.arto, name, set(value) if isinstance(value, list) else value)
 
 
 def settings_of(scene: bpy.types.Scene) -> dict[str, Any]:
-    """ARTO's settings of a scene, but for places."""
+    """ARTO's settings of a scene that `SETTINGS` names."""
     found = {}
-    for prop in scene.arto.bl_rna.properties:
-        if prop.is_readonly or prop.identifier in _PLACES | {"rna_type", "name"}:
-            continue
-        value = getattr(scene.arto, prop.identifier)
-        if isinstance(value, bool | int | float | str):
-            found[prop.identifier] = value
-        elif isinstance(value, set):
-            found[prop.identifier] = sorted(value)
+    for name in SETTINGS:
+        value = getattr(scene.arto, name)
+        found[name] = sorted(value) if isinstance(value, set) else value
+    if samples_told(scene):
+        found["quality"] = "CUSTOM"
     return found
 
 
@@ -159,10 +210,13 @@ def write(
     scene: bpy.types.Scene,
     view_layer: str,
     frames: list[int],
+    subframe: float,
+    catchers: list[int],
     tiles: int,
     seeds: int,
 ) -> Job:
-    """Write a job's description. Raises FarmError."""
+    """Write a job's description. subframe: of all frames; catchers: the frames that show some.
+    Raises FarmError."""
     blend = Path(home.file())
     data = {
         "format": "ARTO farm job",
@@ -174,9 +228,11 @@ def write(
         "view_layer": view_layer,
         "settings": settings_of(scene),
         "frames": frames,
+        "subframe": subframe,
+        "catchers": catchers,
         "tiles": tiles,
         "seeds": seeds,
-        "parts": len(frames) * tiles * seeds,
+        "parts": (len(frames) + len(TAKES) * len(catchers)) * tiles * seeds,
     }
     try:
         write_text(folder / HEADER, json.dumps(data, indent=1))

@@ -1,5 +1,5 @@
-"""A part of a farm's job: one tile of one frame under one seed, rendered and, where it is the only
-seed and no images are kept, fitted."""
+"""A part of a farm's job: one tile of one take of a frame under one seed, rendered and, where it is
+the only seed and no images are kept, fitted."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def render_part(job_folder: Path, number: int) -> Steps:
     """
     job = Job(job_folder)
     part = job.part(number)
-    captured = job.set_of(part.frame)
+    captured = job.set_of(part.frame, part.take)
     folder = job.part_folder(part)
     if job.there(part, captured.head["key"]):
         yield Progress(1.0, f"{part.name} is there")
@@ -49,8 +49,8 @@ def render_part(job_folder: Path, number: int) -> Steps:
         partial.mkdir(parents=True)
         with _on_stage(job, part, captured) as this:
             files = yield from render_tile(this.on, captured.head, part.tile, partial)
-        told: dict[str, Any] = {"part": vars(part), "key": captured.head["key"]}
-        told["samples"] = captured.head["samples"]
+        told: dict[str, Any] = {"part": part.to_json(), "key": captured.head["key"]}
+        told["samples"] = job.samples_of(captured.head)
         if job.seeds == 1 and not captured.kept:
             told["fitted"] = yield from _fitted(captured, part, partial, files)
             for name in files:
@@ -69,12 +69,20 @@ def render_part(job_folder: Path, number: int) -> Steps:
 
 def save_part(job_folder: Path, number: int) -> Steps:
     """Save a part as .blend files that a Blender without ARTO renders, one for each of its renders;
-    returns the first. What they render to, `gather` finds. Raises as `render_part`."""
+    returns the first. What they render to, `gather` finds. Raises as `render_part`, and FarmError
+    where a take has linked objects otherwise than their library."""
     job = Job(job_folder)
     part = job.part(number)
-    captured = job.set_of(part.frame)
+    captured = job.set_of(part.frame, part.take)
     saved = []
     with _on_stage(job, part, captured) as this:
+        for thing in this.otherwise:
+            if thing.library or thing.override_library:
+                raise FarmError(
+                    f"'{thing.name}' comes from a library, and a file has it as the library does, "
+                    f"but {part.name} needs it otherwise, as there are shadow catchers: render "
+                    "that part with ARTO, or make the object local and plan again"
+                )
         for i, images in enumerate(plan_of(captured.head)):
             yield Progress(i / len(plan_of(captured.head)), f"saving {part.name}")
             path = job.folder / "parts" / f"{part.name}_{i:02d}.blend"
@@ -97,12 +105,13 @@ def _save_alone(scene: bpy.types.Scene, path: Path) -> None:
 def _on_stage(job: Job, part: Part, captured: CaptureSet) -> Iterator[Asked]:
     """The stage of a part, with its seed. Raises FarmError unless the scene is what was planned."""
     head = captured.head
+    given = Given(captured.hemicube, head["route"], None)
+    samples = job.samples_of(head)
     with job.scene() as (scene, view_layer):
-        scene.frame_set(part.frame)
+        job.go_to(scene, part.frame)
         check_scene(scene, view_layer)
-        scene.view_layers[view_layer].update()
-        with asked(scene, view_layer, Given(captured.hemicube, head["route"], None)) as this:
-            changed = _differences(this, head)
+        with asked(scene, view_layer, given, part.take) as this:
+            changed = _differences(this, head | {"samples": samples})
             if changed:
                 raise FarmError(
                     f"this is not the scene that was planned ({'; '.join(changed[:3])}): give "
@@ -110,21 +119,23 @@ def _on_stage(job: Job, part: Part, captured: CaptureSet) -> Iterator[Asked]:
                 )
             if job.seeds > 1:
                 # a stretch of the one sequence that as many samples together have, which is better
-                # than as many seeds: its samples lie between those of the other stretches
+                # than as many seeds: its samples lie between those of the other stretches. All
+                # takes have the same: noise that they share goes where they are divided
                 cycles = this.on.scene.cycles
                 cycles.use_sample_subset = True
-                cycles.sample_subset_length = head["samples"]
-                cycles.sample_offset = part.seed * head["samples"]
-                cycles.samples = job.seeds * head["samples"]
+                cycles.sample_subset_length = samples
+                cycles.sample_offset = part.seed * samples
+                cycles.samples = job.seeds * samples
             yield this
 
 
 def _differences(this: Asked, head: dict[str, Any]) -> list[str]:
     """What of a scene is not as it was planned, in words."""
     out = []
-    for name in ("samples", "seed", "adaptive", "far", "blender", "colour_space"):
-        if this.decides[name] != head.get(name):
-            out.append(f"{name.replace('_', ' ')}: {this.decides[name]}, not {head.get(name)}")
+    for name in ("samples", "seed", "adaptive", "far", "blender", "colour_space", "catchers"):
+        here = this.decides.get(name)
+        if here != head.get(name):
+            out.append(f"{name.replace('_', ' ')}: {here}, not {head.get(name)}")
     planned = head["fingerprint"]
     for thing in sorted(planned.keys() | this.found.keys()):
         if planned.get(thing) != this.found.get(thing):

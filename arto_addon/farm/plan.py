@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import bpy
 
@@ -12,11 +14,16 @@ from ...core.capture_set import write_header
 from ...core.choice import check as check_choice
 from ...core.errors import FarmError
 from ...core.patterns import pattern_set
+from ...core.region import Region
+from ..capture import room
 from ..capture.asked import asked, begun
+from ..capture.beside import PAIR, TAKES, given_by
+from ..capture.capture import plan_of
 from ..capture.check import check_scene
 from ..capture.planned import Given
 from ..capture.sequence import frame_kept, together
 from ..shot import home
+from ..stage.takes import WHOLE
 from ..work import Progress, Steps
 from . import job, templates
 
@@ -25,16 +32,19 @@ def plan(
     scene: bpy.types.Scene,
     view_layer: str,
     folder: Path,
-    frames: Sequence[int],
+    frames: Sequence[int] | None,
     tiles: int | None,
     seeds: int,
 ) -> Steps:
     """Write a job of so many tiles (default: as the memory says) and seeds for each frame into a
     folder, and what farms take it by; returns its folder.
 
-    Raises FarmError for a folder that has a job with parts already, or a file that was never saved;
-    and what `capture` raises.
+    frames: default the one that the scene is at, between two of them as well. Raises FarmError for
+    a folder that has a job with parts already, or not the room for them, or a file that was never
+    saved; and what `capture` raises.
     """
+    if frames is not None and not frames:
+        raise FarmError("there are no frames to plan: give a first and a last one")
     if not home.file():
         raise FarmError("this .blend was never saved, so no other machine can open it: save it")
     if (folder / "parts").is_dir() and any((folder / "parts").iterdir()):
@@ -43,33 +53,95 @@ def plan(
             "another folder"
         )
     check_choice(scene.arto.support, pattern_set(scene.arto.patterns), scene.arto.separate)
+    # first, so that who is killed while planning leaves no job
+    (folder / job.HEADER).unlink(missing_ok=True)
     for old in folder.glob("frame_*"):
         shutil.rmtree(old)
+    subframe = scene.frame_subframe if frames is None else 0.0
+    frames = [scene.frame_current] if frames is None else list(frames)
+    catchers: list[int] = []
+    needed, caution = 0, None
     with frame_kept(scene):
         given: Given | None = None
         if len(frames) > 1:
             given = yield from together(scene, view_layer, frames)
         for i, frame in enumerate(frames):
             yield Progress(i / len(frames), f"planning frame {frame}")
-            scene.frame_set(frame)
+            scene.frame_set(frame, subframe=subframe)
             check_scene(scene, view_layer)
-            with asked(scene, view_layer, given) as this:
-                if this.catchers:
-                    raise FarmError(
-                        "this shot has shadow catchers, which are captured on one machine: use "
-                        "Capture, or turn Shadow Catcher off"
-                    )
-                there = folder / f"frame_{frame:04d}"
-                planned, head = yield from begun(this, folder, given, tiles)
+            # whatever a script has moved is where it should be
+            scene.view_layers[view_layer].update()
+            heads = yield from _heads(scene, view_layer, folder, given, tiles, seeds)
             # every frame is cut as the first one is
-            tiles = len(head["tiles"])
-            write_header(there, head)
-            if given is None:
-                given = Given(planned.hemicube, planned.route, planned.caution)
-    made = job.write(folder, scene, view_layer, list(frames), tiles or 1, seeds)
+            tiles = len(heads[WHOLE]["tiles"])
+            caution = caution or heads[WHOLE]["caution"]
+            if len(heads) > 1:
+                catchers.append(frame)
+            for take, head in heads.items():
+                write_header(job.set_folder(folder, frame, take), head)
+                needed += _disk(head, seeds)
+    _check_disk(folder, needed)
+    made = job.write(folder, scene, view_layer, frames, subframe, catchers, tiles or 1, seeds)
     templates.write(made)
-    count = len(made.parts)
+    takes = f", {1 + len(TAKES)} takes of {len(catchers)} with shadow catchers" if catchers else ""
+    told = f". CAUTION: {caution['text']}" if caution else ""
     yield Progress(
-        1.0, f"planned {count} parts: {len(frames)} frames, {tiles} tiles, {seeds} seeds"
+        1.0,
+        f"planned {len(made.parts)} parts: {len(frames)} frames{takes}, {tiles} tiles, {seeds} "
+        f"seeds; {room.size(needed)} of disk until they are gathered{told}",
     )
     return folder
+
+
+def _heads(
+    scene: bpy.types.Scene,
+    view_layer: str,
+    folder: Path,
+    given: Given | None,
+    tiles: int | None,
+    seeds: int,
+) -> Steps:
+    """Plan the takes of a frame -> the description of each one's capture set, by the take's name,
+    that of everything first."""
+    with asked(scene, view_layer, given) as this:
+        count = 1 + len(TAKES) * this.catchers
+        _, first = yield from begun(this, folder, given, tiles, count)
+    first["key"] = _key_of(first, seeds)
+    heads = {WHOLE: first}
+    for name in TAKES if this.catchers else ():
+        beside = given_by(first)
+        with asked(scene, view_layer, beside, name) as this:
+            _, head = yield from begun(this, folder, beside, len(first["tiles"]))
+        head["key"], head[PAIR] = _key_of(head, seeds), first["key"]
+        heads[name] = head
+    return heads
+
+
+def _key_of(head: dict[str, Any], seeds: int) -> str:
+    """The key of what all seeds make together: it is no capture of the samples of one."""
+    if seeds == 1:
+        return head["key"]
+    return hashlib.sha256(f"{head['key']} {seeds}".encode()).hexdigest()[:16]
+
+
+def _disk(head: dict[str, Any], seeds: int) -> int:
+    """Bytes that the parts of a take have in a job's folder until they are gathered: light by light
+    where there are seeds to be averaged, or images are kept."""
+    tiles = [Region(*t["region"]) for t in head["tiles"]]
+    images = [len(some) for some in plan_of(head)]
+    fitted = room.estimate(images, tiles, head["patches"], True).kept
+    if seeds == 1 and not head["kept"]:
+        return fitted
+    light = seeds * room.estimate(images, tiles, head["patches"], False).kept
+    return light if head["kept"] else light + fitted
+
+
+def _check_disk(folder: Path, needed: int) -> None:
+    """Raise FarmError where a job's folder has not the room for its parts."""
+    free = shutil.disk_usage(folder).free
+    if free < needed * (1 + room.SPARE):
+        raise FarmError(
+            f"the parts of this job need {room.size(needed)} of disk, and {folder} has "
+            f"{room.size(free)} free: make room, or plan into another folder, or fewer frames or "
+            "seeds"
+        )

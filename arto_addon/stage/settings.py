@@ -82,12 +82,15 @@ QUALITIES = {"DRAFT": 0.25, "GOOD": 1.0, "FINAL": 4.0}
 MOST_ADAPTIVE = 256
 
 
+def samples_told(scene: bpy.types.Scene) -> bool:
+    """Whether a file from before there was a choice, or a script, says how many samples."""
+    return scene.arto.is_property_set("samples") and not scene.arto.is_property_set("quality")
+
+
 def samples_of(scene: bpy.types.Scene) -> int:
     """The samples of a capture, by the quality that the artist chose."""
     s, cycles = scene.arto, scene.cycles
-    # a file from before there was a choice, or a script, says how many
-    told = s.is_property_set("samples") and not s.is_property_set("quality")
-    if s.quality == "CUSTOM" or told:
+    if s.quality == "CUSTOM" or samples_told(scene):
         return s.samples
     own = min(cycles.samples, MOST_ADAPTIVE) if cycles.use_adaptive_sampling else cycles.samples
     return max(1, round(own * QUALITIES[s.quality]))

@@ -27,17 +27,21 @@ _RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shado
 
 
 @contextmanager
-def take(seen: Rendered, name: str) -> Iterator[None]:
-    """The objects as a take of what is rendered has them. Raises SceneError."""
+def take(seen: Rendered, name: str) -> Iterator[list[bpy.types.Object]]:
+    """The objects as a take of what is rendered has them; those that it has otherwise than the
+    artist. Raises SceneError."""
     if not seen.catchers:
         if name != WHOLE:
-            raise ValueError(f"a scene without shadow catchers has no take '{name}'")
-        yield
+            raise SceneError(
+                f"nothing in the scene catches shadows, so it has no take '{name}': open the file "
+                "whose catchers were captured, or capture or plan anew"
+            )
+        yield []
         return
     seen.check()
     wanted: list[tuple[Any, str, bool]] = []
     if name == THINGS:
-        yield
+        yield []
         return
     for thing in _originals(seen.flagged):
         _check_still(thing)
@@ -49,7 +53,7 @@ def take(seen: Rendered, name: str) -> Iterator[None]:
     try:
         for thing, flag, value in wanted:
             setattr(thing, flag, value)
-        yield
+        yield list(dict.fromkeys(thing for thing, _, _ in wanted))
     finally:
         for thing, flag, value in were:
             setattr(thing, flag, value)

@@ -181,12 +181,11 @@ def main(arguments: list[str]) -> int:
             print(json.dumps(run(work, ProgressLines(verb)).to_json()), flush=True)
             return 0
         if verb == "plan":
-            some = frames or [scene.frame_current]
             tiles, seeds = planned["tiles"], planned["seeds"]
             if (tiles is not None and tiles < 1) or seeds < 1:
                 print("ARTO: --tiles and --seeds are at least 1", file=sys.stderr)
                 return 2
-            work = plan(scene, layer, planned["job"].resolve(), some, tiles, seeds)
+            work = plan(scene, layer, planned["job"].resolve(), frames, tiles, seeds)
         elif verb == "capture" and frames:
             work = capture_frames(scene, layer, frames)
         elif verb == "relight" and frames and not worlds and turns == 1:

@@ -11,14 +11,13 @@ from arto.arto_addon import fit, work
 from arto.arto_addon.blender.output import float_exr
 from arto.arto_addon.capture import capture, room
 from arto.arto_addon.capture.sequence import capture_frames
-from arto.arto_addon.farm.plan import plan
 from arto.arto_addon.relight import plate
 from arto.arto_addon.relight.many import relight_many
 from arto.arto_addon.relight.present import present_frames
 from arto.arto_addon.shot import paths
 from arto.arto_addon.stage.stage import stage
 from arto.core import exr
-from arto.core.errors import CancelledError, FarmError, FieldError, SceneError
+from arto.core.errors import CancelledError, FieldError, SceneError
 from arto.core.field import Field
 from scene_tools import (
     BOX,
@@ -270,15 +269,6 @@ def test_frames_with_a_catcher(tmp_path):
         expected = exr.read(path)[""][..., :3] + 0.5 * exr.read(plate.share_file(path))[""]
         found = composited(scene, tmp_path)
         np.testing.assert_allclose(found[..., :3], expected, atol=2e-3)
-
-
-def test_farms_refuse_catchers(tmp_path):
-    scene = with_catcher(tmp_path, samples=4, patches=1)
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
-    scene = bpy.context.scene
-    with pytest.raises(FarmError, match="one machine"):
-        work.run(plan(scene, scene.view_layers[0].name, tmp_path / "job", [1], None, 1))
-    assert scene.objects["Floor"].is_shadow_catcher
 
 
 def test_an_earlier_capture_stays_whole_until_the_new_one_is(tmp_path):
