@@ -19,7 +19,7 @@ from ..capture.capture import check_file, plan_of
 from ..capture.resume import empty, finish, finish_field, let_go
 from ..capture.stream import Stream
 from ..relight.denoise import cleaned
-from ..shot import paths
+from ..shot import paths, scene_id
 from ..shot.shot import shot_of
 from ..work import Progress, Steps
 from .job import Job, Part
@@ -183,6 +183,9 @@ def _placed(scene: bpy.types.Scene, folder: Path, place: Path) -> Steps:
     except OSError as e:
         raise FarmError(f"{place} cannot be written ({e}): make room, and gather again") from e
     head = CaptureSet(near).head
+    # planned from a file that no capture has given an ID, it has none, and no name lasts
+    head["shot"]["scene_id"] = scene_id.of(scene)
+    write_header(near, head)
     if not head["kept"]:
         finish_field(near, place / "field", head)
         yield from cleaned(scene, place / "field")

@@ -21,7 +21,11 @@ from ...core.capture_set import CaptureSet
 from ...core.description import Description
 from ...core.errors import FarmError
 from ...core.files import write_text
+from ...core.region import Region
+from ..capture import room
 from ..capture.beside import TAKES
+from ..capture.capture import plan_of
+from ..capture.room import Estimate
 from ..capture.sequence import frame_kept
 from ..shot import home
 from ..stage.settings import samples_told
@@ -192,6 +196,13 @@ def _set(scene: bpy.types.Scene, settings: dict[str, Any]) -> None:
         if name in settings:
             value = settings[name]
             setattr(scene.arto, name, set(value) if isinstance(value, list) else value)
+
+
+def estimate(head: dict[str, Any], fitted: bool) -> Estimate:
+    """What a take of a frame needs, all its tiles under one seed; fitted: see `room.estimate`."""
+    tiles = [Region(*t["region"]) for t in head["tiles"]]
+    images = [len(some) for some in plan_of(head)]
+    return room.estimate(images, tiles, head["patches"], fitted)
 
 
 def settings_of(scene: bpy.types.Scene) -> dict[str, Any]:

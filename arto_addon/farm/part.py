@@ -20,13 +20,14 @@ from ...core.files import PART, replace_folder, write_text
 from ...core.fit import fit_into
 from ...core.shot import Shot
 from ..blender.output import write_to
+from ..capture import room
 from ..capture.asked import Asked, asked
 from ..capture.capture import plan_of, render_tile, set_tile
 from ..capture.check import check_scene
 from ..capture.planned import Given
 from ..capture.stream import Stream
 from ..work import Progress, Steps
-from .job import PART_HEADER, Job, Part
+from .job import PART_HEADER, Job, Part, estimate
 
 
 def render_part(job_folder: Path, number: int) -> Steps:
@@ -42,6 +43,8 @@ def render_part(job_folder: Path, number: int) -> Steps:
     if job.there(part, captured.head["key"]):
         yield Progress(1.0, f"{part.name} is there")
         return folder
+    fitted = job.seeds == 1 and not captured.kept
+    room.check_memory(estimate(captured.head, fitted).memory, part.name)
     begun = time.perf_counter()
     # by its process: a farm may have given the part to two machines
     partial = folder.with_name(f"{part.name}.{os.getpid()}{PART}")
@@ -51,7 +54,7 @@ def render_part(job_folder: Path, number: int) -> Steps:
             files = yield from render_tile(this.on, captured.head, part.tile, partial)
         told: dict[str, Any] = {"part": part.to_json(), "key": captured.head["key"]}
         told["samples"] = job.samples_of(captured.head)
-        if job.seeds == 1 and not captured.kept:
+        if fitted:
             told["fitted"] = yield from _fitted(captured, part, partial, files)
             for name in files:
                 (partial / name).unlink()
@@ -70,10 +73,16 @@ def render_part(job_folder: Path, number: int) -> Steps:
 def save_part(job_folder: Path, number: int) -> Steps:
     """Save a part as .blend files that a Blender without ARTO renders, one for each of its renders;
     returns the first. What they render to, `gather` finds. Raises as `render_part`, and FarmError
-    where a take has linked objects otherwise than their library."""
+    for what such a Blender would render otherwise: a moment between two frames, and a take that has
+    linked objects otherwise than their library."""
     job = Job(job_folder)
     part = job.part(number)
     captured = job.set_of(part.frame, part.take)
+    if job.subframe:
+        raise FarmError(
+            f"{part.name} is of a moment between two frames, and what renders a file renders whole "
+            "ones: render that part with ARTO, or plan it at a whole frame"
+        )
     saved = []
     with _on_stage(job, part, captured) as this:
         for thing in this.otherwise:

@@ -14,11 +14,9 @@ from ...core.capture_set import write_header
 from ...core.choice import check as check_choice
 from ...core.errors import FarmError
 from ...core.patterns import pattern_set
-from ...core.region import Region
 from ..capture import room
 from ..capture.asked import asked, begun
 from ..capture.beside import PAIR, TAKES, given_by
-from ..capture.capture import plan_of
 from ..capture.check import check_scene
 from ..capture.planned import Given
 from ..capture.sequence import frame_kept, together
@@ -57,13 +55,15 @@ def plan(
     (folder / job.HEADER).unlink(missing_ok=True)
     for old in folder.glob("frame_*"):
         shutil.rmtree(old)
-    subframe = scene.frame_subframe if frames is None else 0.0
+    # as `capture` takes the scene as it stands, and `capture_frames` whole frames together
+    several = frames is not None
+    subframe = 0.0 if several else scene.frame_subframe
     frames = [scene.frame_current] if frames is None else list(frames)
     catchers: list[int] = []
     needed, caution = 0, None
     with frame_kept(scene):
         given: Given | None = None
-        if len(frames) > 1:
+        if several:
             given = yield from together(scene, view_layer, frames)
         for i, frame in enumerate(frames):
             yield Progress(i / len(frames), f"planning frame {frame}")
@@ -127,13 +127,10 @@ def _key_of(head: dict[str, Any], seeds: int) -> str:
 def _disk(head: dict[str, Any], seeds: int) -> int:
     """Bytes that the parts of a take have in a job's folder until they are gathered: light by light
     where there are seeds to be averaged, or images are kept."""
-    tiles = [Region(*t["region"]) for t in head["tiles"]]
-    images = [len(some) for some in plan_of(head)]
-    fitted = room.estimate(images, tiles, head["patches"], True).kept
-    if seeds == 1 and not head["kept"]:
-        return fitted
-    light = seeds * room.estimate(images, tiles, head["patches"], False).kept
-    return light if head["kept"] else light + fitted
+    light, field = (job.estimate(head, fitted).kept for fitted in (False, True))
+    if head["kept"]:
+        return seeds * light
+    return field if seeds == 1 else seeds * light + field
 
 
 def _check_disk(folder: Path, needed: int) -> None:

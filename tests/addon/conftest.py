@@ -24,6 +24,16 @@ def scene(tmp_path: Path) -> bpy.types.Scene:
     return small_scene(tmp_path)
 
 
+@pytest.fixture
+def farm_scene(tmp_path: Path) -> bpy.types.Scene:
+    """A saved scene, as a farm's machines open it."""
+    scene = small_scene(tmp_path)
+    scene.arto.keep, scene.arto.patterns, scene.arto.samples = "never", "linear", 16
+    scene.arto.adaptive, scene.arto.patches = True, 2
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    return scene
+
+
 @pytest.fixture(scope="session")
 def noise(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Any]:
     """Basis images of the small scene by route and seed, each captured once a session."""
