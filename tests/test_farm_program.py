@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from arto.core import exr
 from program_tools import Program, said
 
 # One machine, with the tiles that the job has.
@@ -25,6 +26,25 @@ bpy.ops.arto.capture()
 """
 # As a farm starts Blender: no preferences, no network, and the one add-on.
 QUIET = ("-b", "--factory-startup", "--offline-mode", "--addons", "bl_ext.user_default.arto")
+
+
+# A shot with a shadow catcher, small and quick.
+CATCHER = """
+import bpy, sys
+bpy.ops.wm.read_factory_settings()
+bpy.ops.preferences.addon_enable(module="bl_ext.user_default.arto")
+scene = bpy.context.scene
+scene.render.engine = "CYCLES"
+scene.render.resolution_x, scene.render.resolution_y = 48, 36
+scene.render.resolution_percentage = 100
+scene.render.film_transparent = True
+scene.cycles.samples = 32
+bpy.ops.mesh.primitive_plane_add(size=20, location=(0, 0, -1))
+bpy.context.object.is_shadow_catcher = True
+scene.arto.quality, scene.arto.patches, scene.arto.adaptive = "DRAFT", 1, False
+scene.arto.denoise = False
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[-1])
+"""
 
 
 def arrays(folder: Path) -> dict[str, np.ndarray]:
@@ -80,3 +100,37 @@ def test_an_openjd_job_is_what_one_machine_makes(
     for name, array in expected.items():
         np.testing.assert_array_equal(array, found[name], err_msg=name)
     assert not list((job / "parts").iterdir())
+
+
+def test_a_shot_with_a_catcher_by_the_lines_of_a_shell(program: Program, tmp_path: Path) -> None:
+    """A part for each take, by workers that have no settings: plate and share, bit for bit."""
+    pictures = []
+    for way in ("one", "farm"):
+        blend, job = tmp_path / way / "shot.blend", tmp_path / way / "job"
+        blend.parent.mkdir()
+        program.script(CATCHER, blend)
+        if way == "one":
+            done = program.run("-b", blend, "--command", "arto", "capture")
+            assert done.returncode == 0, said(done)
+        else:
+            line = ("plan", "--job", job, "--tiles", "1")
+            done = program.run(*QUIET, blend, "--command", "arto", *line)
+            assert done.returncode == 0 and "3 takes of 1 with shadow catchers" in said(done)
+            environment = {**program.environment, "BLEND": str(blend), "JOB": str(job)}
+            lines = (job / "commands.txt").read_text().splitlines()
+            assert len(lines) == 4
+            for text in lines:
+                assert text.startswith("blender ")
+                command = shlex.join(program.command) + text.removeprefix("blender")
+                done = subprocess.run(
+                    ["sh", "-c", command], env=environment, capture_output=True, text=True,
+                    timeout=120,
+                )  # fmt: skip
+                assert done.returncode == 0, said(done)
+        done = program.run("-b", blend, "--command", "arto", "relight")
+        assert done.returncode == 0, said(done)
+        files = [blend.parent / f"shot_relit{end}.exr" for end in ("", "_catcher")]
+        pictures.append([exr.read(file)[""] for file in files])
+    for one, two in zip(*pictures, strict=True):
+        np.testing.assert_array_equal(one, two)
+    assert pictures[0][1].min() < 0.8, "there is a shadow"
