@@ -53,7 +53,7 @@ def write(shown: Shown, ready: Ready, made: Made, about: dict[str, str]) -> Step
     if settings.layers != "OFF":
         name = plate.layers_file(path).name
         if settings.layers_files == "EACH":
-            name = f"{path.stem}_{settings.layer_prefix}*.exr"
+            name = f"{path.stem}_{layers.prefix_of(scene)}*.exr"
         about[plate.LAYERS.removeprefix("arto.")] = name
     if plate.window_of(scene).crop:
         about[plate.CROPPED.removeprefix("arto.")] = plate.full_file(path).name
