@@ -45,6 +45,7 @@ def write(shown: Shown, ready: Ready, made: Made, about: dict[str, str]) -> Step
         "look": ready.lit.look,
         "turn": f"{math.degrees(ready.whole.turn):.4g}" if ready.whole.turn else "",
         "world by rays": ready.by_rays,
+        "world below 0": ready.below,
         "changed since capture": "; ".join(ready.changed),
     }
     about = {name: text for name, text in about.items() if text}

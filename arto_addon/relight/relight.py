@@ -192,6 +192,7 @@ class Ready:
     light: PatchLight
     changed: list[str]
     by_rays: str
+    below: str
     laps: Laps
 
 
@@ -236,6 +237,10 @@ def make_ready(shown: Shown, lit: Light) -> Steps:
     if by_rays := differs_by_rays(world):
         yield Progress(0.0, f"the world is {by_rays}")
     whole = kept.environment(scene, settings.environment_width, layer, lit.world)
+    below = ""
+    if whole.below_zero > LEAST_SHARE:
+        below = f"{whole.below_zero:.1%} of its light is below 0"
+        yield Progress(0.0, f"the world is no light: {below}, which no layer and no shadow has")
     laps.lap("world")
     found = shown.split(whole)
     parts, lamps, together = yield from _lamps(shown, found)
@@ -246,7 +251,9 @@ def make_ready(shown: Shown, lit: Light) -> Steps:
     yield Progress(0.5, "bringing the environment to the patches")
     light = PatchLight(found.rest if parts else whole, field.hemicube)
     laps.lap("light")
-    return Ready(lit, world, whole, found, rendered, lamps, together, light, changed, by_rays, laps)
+    return Ready(
+        lit, world, whole, found, rendered, lamps, together, light, changed, by_rays, below, laps
+    )
 
 
 def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> Steps:
