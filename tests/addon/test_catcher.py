@@ -119,6 +119,20 @@ def test_what_makes_a_catcher_must_not_be_a_thing(tmp_path):
         captured(scene)
 
 
+def test_what_an_instance_makes_a_catcher_must_not_be_a_thing(tmp_path):
+    """Hidden as a thing it would be hidden as a catcher, and shadows on it were too dark."""
+    scene = with_catcher(tmp_path, samples=4, patches=1)
+    boxes = bpy.data.collections.new("Boxes")
+    boxes.objects.link(scene.objects["Matt"])
+    empty = instance_of(boxes, scene.collection)
+    empty.location, empty.is_shadow_catcher = (0, 2, 0), True
+    with pytest.raises(SceneError, match="'Matt' is in the picture both as"):
+        captured(scene)
+    # by itself it may be one
+    scene.collection.objects.unlink(scene.objects["Matt"])
+    captured(scene)
+
+
 def test_an_animated_flag_is_refused(tmp_path):
     scene = with_catcher(tmp_path, samples=4, patches=1)
     scene.objects["Floor"].keyframe_insert("is_shadow_catcher", frame=1)
