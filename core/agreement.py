@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 # Pixels a side of the regions that are compared.
 BLOCK = 6
-# A region differs by more than this share of its light, and by so many standard errors.
-DIFFERENT = 0.15
+# A region differs by more than this share of its light, and by so many standard errors; the smaller
+# share is for a scene that is known to be lit otherwise by one of the two.
+DIFFERENT, SUSPECTED = 0.15, 0.03
 SURE = 6.0
 # So many regions of a hundred that differ are no accident of one firefly.
 SHARE = 0.04
@@ -38,11 +39,17 @@ class Agreement:
         return self.share <= SHARE
 
 
-def agreement(found: NDArray, expected: NDArray, always: NDArray | float = 0.0) -> Agreement:
+def agreement(
+    found: NDArray,
+    expected: NDArray,
+    always: NDArray | float = 0.0,
+    different: float = DIFFERENT,
+) -> Agreement:
     """Compare `found` with the mean of `expected`, renders of other seeds.
 
     found: (H, W, 3); expected: (N, H, W, 3), N at least 2; always: (H, W, 3), light that is in
-    all of them and none of the matter. Non-finite pixels are left out.
+    all of them and none of the matter; different: the share of its light by which a region must be
+    off. Non-finite pixels are left out.
     """
     one = (found - always).sum(axis=-1).astype(np.float64)
     many = (expected - always).sum(axis=-1).astype(np.float64)
@@ -66,7 +73,7 @@ def agreement(found: NDArray, expected: NDArray, always: NDArray | float = 0.0) 
     total = max(float(truth.mean()), 1e-12)
     # what is dark beside the picture may be wrong by much of itself
     floor = np.maximum(mean, 0.1 * total)
-    differs = (np.abs(apart.mean(axis=1)) > DIFFERENT * floor) & (
+    differs = (np.abs(apart.mean(axis=1)) > different * floor) & (
         np.abs(apart.mean(axis=1)) > SURE * error
     )
     there = float(mean[differs].sum())

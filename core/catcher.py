@@ -21,6 +21,8 @@ MOST = 10.0
 # The share of a pixel that is left of the ground from which on its shadow is believed in part, and
 # wholly: below, the outlines' noise is all there is.
 HIDDEN, TRUSTED = 0.1, 0.5
+# Holes of less than this are the rounding of alphas, which are kept as half floats.
+ROUNDED = 4e-3
 
 
 @dataclass(frozen=True)
@@ -54,40 +56,67 @@ class Caught:
         return np.maximum(self.colour + seen * footage + self.light, 0).astype(np.float32)
 
 
-def catch(whole: NDArray, ground: NDArray, things: NDArray, there: NDArray | None = None) -> Caught:
+def catch(
+    whole: NDArray,
+    ground: NDArray,
+    things: NDArray,
+    there: NDArray | None = None,
+    held: NDArray | float = 0.0,
+) -> Caught:
     """How things and their shadows go into footage.
 
     whole: (H, W, 3), ground and things; ground: (H, W, 3), the ground alone; things: (H, W, 4),
     these alone, where the ground does not hide them. All premultiplied, and without noise, or the
     ratio has all of it. there: (H, W), how much of a pixel the ground covers by itself (default:
-    all).
+    all); held: (H, W), how much is cut out before the ground, see `held_out`.
     """
-    return catch_seen(*of_ground(whole, ground, things), things, there)
+    return catch_seen(*of_ground(whole, ground, things, held), things, there, held)
 
 
-def of_ground(whole: NDArray, ground: NDArray, things: NDArray) -> tuple[NDArray, NDArray]:
+def held_out(whole: NDArray, ground: NDArray, things: NDArray) -> NDArray[np.float32]:
+    """How much of a pixel is cut out before the ground by what holds out, from the alphas of the
+    three takes, (H, W) each -> (H, W).
+
+    The ground is alone without what holds out, so that all of it is there; with everything in the
+    picture, what is missing of it is the holes. For a scene that has such things: where coverage is
+    a matter of chance, what the three of them differ by is noise.
+    """
+    left = 1 - things.astype(np.float64)
+    seen = np.divide(whole - things, ground, out=left.copy(), where=ground > 0)
+    held = np.clip(left - seen, 0, left)
+    return np.where(held > ROUNDED, held, 0).astype(np.float32)
+
+
+def of_ground(
+    whole: NDArray, ground: NDArray, things: NDArray, held: NDArray | float = 0.0
+) -> tuple[NDArray, NDArray]:
     """What is seen of the ground beside things, and what would be without their shadows, (H, W, 3)
-    each, premultiplied by what the things leave.
+    each, premultiplied by what the things, and holes, leave.
 
     A denoiser is given these, not the whole and the ground: it lets what is bright glow over its
     outline, and beside a thing that would be light on the ground. In these two the outline is the
     same, and what glows of it is the same share of both.
     """
-    return whole - things[..., :3], (1 - things[..., 3])[..., None] * ground
+    return whole - things[..., :3], (1 - things[..., 3] - held)[..., None] * ground
 
 
 def catch_seen(
-    left: NDArray, bare: NDArray, things: NDArray, there: NDArray | None = None
+    left: NDArray,
+    bare: NDArray,
+    things: NDArray,
+    there: NDArray | None = None,
+    held: NDArray | float = 0.0,
 ) -> Caught:
     """As `catch`, of what `of_ground` gives: what is seen of the ground, and without shadows."""
     colour, alpha = things[..., :3], things[..., 3]
-    seen = (1 - alpha)[..., None]
+    seen = (1 - alpha - held)[..., None]
     floor = FLOOR * _median(bare, seen[..., 0], there)
     ratio = np.clip((left + floor * seen) / (bare + floor * seen + 1e-30), 0, MOST)
     trusted = np.clip((seen - HIDDEN) / (TRUSTED - HIDDEN), 0, 1)
     ratio = spread(ratio, trusted if there is None else trusted * (there > 0)[..., None])
     covered = 1.0 if there is None else there[..., None]
-    share = seen * (1 + covered * (ratio - 1))
+    # through a hole the footage is seen as it is
+    share = (1 - alpha)[..., None] + seen * covered * (ratio - 1)
     light = left - bare
     return Caught(*(part.astype(np.float32) for part in (colour, alpha, share, light)))
 

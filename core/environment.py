@@ -80,6 +80,13 @@ class Environment:
         rows = np.einsum("hs,hswtc->hwc", weights / weights.sum(axis=1, keepdims=True), blocks)
         return Environment((rows / scale).astype(np.float32), self.turn)
 
+    @property
+    def below_zero(self) -> float:
+        """How much of all that the texels have, by solid angle, is below 0: 0 to 1."""
+        texels = self.row_solid_angles[:, None] * self.image.sum(axis=-1, dtype=np.float64)
+        total = float(np.abs(texels).sum())
+        return float(-np.minimum(texels, 0).sum()) / total if total > 0 else 0.0
+
     def irradiance(self) -> NDArray[np.float64]:
         """(3,): radiance integrated over all directions."""
         rows = self.image.sum(axis=1, dtype=np.float64)

@@ -24,7 +24,7 @@ from .errors import ExrError
 from .exr_layout import LayoutError, PlainPart, forget
 from .exr_layout import check as check_layout
 from .exr_layout import plain as plain_parts
-from .exr_window import FULL, Window, place
+from .exr_window import FULL, Box, Window, box_of, place
 from .files import whole
 
 _ORDER = "RGBAXYZ"  # of channels in an array; others follow
@@ -125,6 +125,12 @@ def part_names(path: Path) -> list[str]:
 def header(path: Path) -> dict[str, Any]:
     """The header of the first part."""
     return dict(_parts(path, header_only=True)[0].header)
+
+
+def windows(path: Path) -> tuple[Box, Box]:
+    """The data and the display window of the first part. Raises ExrError."""
+    head = header(path)
+    return box_of(head["dataWindow"]), box_of(head["displayWindow"])
 
 
 def read(path: Path) -> dict[str, NDArray]:

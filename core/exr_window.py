@@ -107,9 +107,9 @@ def place(heads: Sequence[dict[str, Any]], parts: Sequence[dict[str, NDArray]]) 
 
     Raises ExrError for windows of a damaged header.
     """
-    data = [_box(head["dataWindow"]) for head in heads]
-    others = [_box(head[PICTURE]) for head in heads if PICTURE in head]
-    whole = _around([*data, *others, *(_box(head["displayWindow"]) for head in heads)])
+    data = [box_of(head["dataWindow"]) for head in heads]
+    others = [box_of(head[PICTURE]) for head in heads if PICTURE in head]
+    whole = _around([*data, *others, *(box_of(head["displayWindow"]) for head in heads)])
     width, height = whole[2] - whole[0] + 1, whole[3] - whole[1] + 1
     if width * height > _MOST_PIXELS and any(box != whole for box in data):
         raise ExrError(f"its windows make a picture of {width}x{height} pixels")
@@ -126,7 +126,8 @@ def place(heads: Sequence[dict[str, Any]], parts: Sequence[dict[str, NDArray]]) 
                 channels[name] = out
 
 
-def _box(found: Any) -> Box:
+def box_of(found: Any) -> Box:
+    """A box as ARTO has it."""
     (x0, y0), (x1, y1) = (tuple(int(v) for v in corner) for corner in found)
     return x0, y0, x1, y1
 

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .catcher import catch
+from .catcher import catch, held_out
 from .field import HEADER, Field, proxy_folder
 from .hemicube import Hemicube
 from .light import PatchLight
@@ -29,11 +29,11 @@ class Preview:
     """The fields of a shot, whole and as proxies.
 
     takes: one field, or the three of a shot with shadow catchers (of everything, of the catchers,
-    of the things, see `catcher`).
+    of the things, see `catcher`); holds_out: whether anything cuts holes into the picture.
     """
 
-    def __init__(self, takes: Sequence[Field]) -> None:
-        self.takes = tuple(takes)
+    def __init__(self, takes: Sequence[Field], holds_out: bool = False) -> None:
+        self.takes, self.holds_out = tuple(takes), holds_out
         self._levels: dict[int, tuple[Field, ...]] = {1: self.takes}
         self._seconds: dict[int, float] = {}
         self.factors = [1] + [
@@ -88,7 +88,9 @@ class Preview:
         out = found[0]
         if len(found) > 1:
             whole, alone, apart = found
-            out = catch(whole[..., :3], alone[..., :3], apart, alone[..., 3]).plate
+            alphas = whole[..., 3], alone[..., 3], apart[..., 3]
+            held = held_out(*alphas) if self.holds_out else 0.0
+            out = catch(whole[..., :3], alone[..., :3], apart, alone[..., 3], held).plate
         took = time.perf_counter() - begun
         # what is nearest to the last ones: a machine is busy now and idle then
         self._seconds[factor] = took + 0.5 * (self._seconds.get(factor, took) - took)

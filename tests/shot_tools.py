@@ -8,11 +8,14 @@ from pathlib import Path
 import bpy
 import numpy as np
 from arto.arto_addon import fit, work
+from arto.arto_addon.blender.output import float_exr
 from arto.arto_addon.farm.job import Job
 from arto.arto_addon.farm.plan import plan
 from arto.arto_addon.relight import plate, relight
 from arto.arto_addon.shot import paths
+from arto.arto_addon.stage.stage import stage
 from arto.core import exr
+from arto.core.field import Field
 from scene_tools import captured, hdri, small_scene, smooth
 
 
@@ -82,3 +85,38 @@ def assert_same(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> Non
     assert one.keys() == other.keys() and one
     for name, array in one.items():
         np.testing.assert_array_equal(array, other[name], err_msg=name)
+
+
+def catcher_passes(scene, samples, seed, tmp_path, share=True) -> dict[str, np.ndarray]:
+    """What Cycles renders with its own catcher, by pass; share: with its Shadow Catcher pass."""
+    with stage(scene, scene.view_layers[0].name) as on:
+        float_exr(on.scene.render)
+        on.scene.view_layers[0].cycles.use_pass_shadow_catcher = share
+        cycles = on.scene.cycles
+        cycles.samples, cycles.seed, cycles.sample_clamp_indirect = samples, seed, 0
+        cycles.use_adaptive_sampling = cycles.use_denoising = False
+        on.scene.render.filepath = str(tmp_path / "catcher.exr")
+        request = work.Render(on.scene.name, 0, "")
+        work.blocking_render(request)
+        request.check()
+    return {name.split(".")[-1]: p for name, p in exr.read(tmp_path / "catcher.exr").items()}
+
+
+def cycles_catcher(scene, samples, seed, tmp_path, share=True) -> np.ndarray:
+    """Of these -> (H, W, 3), the Shadow Catcher pass; or else (H, W, 4), its plate, which has the
+    shadows where there is no such pass."""
+    passes = catcher_passes(scene, samples, seed, tmp_path, share)
+    return passes["Shadow Catcher"][..., :3] if share else passes["Combined"]
+
+
+def comp_by_cycles(scene, samples, seed, tmp_path, footage) -> np.ndarray:
+    """The things in footage, (H, W, 3), as that pass is used: the footage times it where the things
+    leave it to be seen."""
+    passes = catcher_passes(scene, samples, seed, tmp_path)
+    things, share = passes["Combined"], passes["Shadow Catcher"][..., :3]
+    return things[..., :3] + (1 - things[..., 3:]) * share * footage
+
+
+def bare_of(scene) -> np.ndarray:
+    """Where nothing stands before the ground."""
+    return Field(paths.field_folder(scene).parent / "things" / "field").layer("alpha") == 0

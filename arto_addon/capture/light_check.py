@@ -13,7 +13,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...core.agreement import Agreement, agreement
+from ...core.agreement import DIFFERENT, SUSPECTED, Agreement, agreement
 from ...core.environment import Environment, directions, sample_directions
 from ...core.hemicube import Hemicube
 from ...core.patterns import pattern_set
@@ -57,11 +57,13 @@ def check_light(on: Stage, hemicube: Hemicube) -> Steps:
             on.scene.cycles.seed = seed
             on.scene.cycles.transparent_max_bounces = through
         truth = np.stack(expected)
-        seen = agreement(found, truth, own)
+        tricked = _tricks_shadows()
+        different = SUSPECTED if tricked else DIFFERENT
+        seen = agreement(found, truth, own, different)
         sampled, text = False, ""
-        if not seen.agrees and seen.worst < 1:
+        if not seen.agrees and (seen.worst < 1 or tricked):
             found = yield from _of_patches(on, hemicube, own, sampled=True)
-            again = agreement(found, truth, own)
+            again = agreement(found, truth, own, different)
             sampled = abs(again.ratio - 1) < abs(seen.ratio - 1)
             if sampled and again.agrees:
                 text = f"{_cause(on)}: it takes a render for each pattern, in which it is right"
@@ -121,6 +123,19 @@ def _words(on: Stage, seen: Agreement) -> str:
     )
 
 
+def _tricks_shadows() -> bool:
+    """Whether there may be things that a world's light passes on its shadow rays and not on others,
+    or the other way: in the file, if not in this scene. What they do is soft, and a shadow that is
+    a tenth too dark on all of a ground is not let pass as noise."""
+    return any(
+        thing.type not in {"LIGHT", "CAMERA", "EMPTY"}
+        and not thing.hide_render
+        and planes.PATTERN not in thing
+        and thing.visible_shadow != thing.visible_diffuse
+        for thing in bpy.data.objects
+    )
+
+
 def _cause(on: Stage) -> str:
     """The likeliest cause, by what the scene has."""
     layer = on.scene.view_layers[0]
@@ -133,6 +148,8 @@ def _cause(on: Stage) -> str:
             continue
         if not thing.visible_shadow:
             return f"'{thing.name}' throws no shadow, and what a world lights through it is dark"
+        if not thing.visible_diffuse:
+            return f"'{thing.name}' is hidden from diffuse rays, and its shadow is not a world's"
         for slot in thing.material_slots:
             if slot.material and _asks_for_shadow_rays(slot.material):
                 return (

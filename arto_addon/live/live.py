@@ -32,6 +32,7 @@ from ..relight.relight import Shown
 from ..shot import paths, watch
 from ..shot.shot import check_same_shot, layer_of
 from ..stage.stage import picture_size
+from ..world.background import holds_out
 from ..world.check import check_world, world_of
 from ..world.kept import shows
 from ..world.lamp_render import region_of
@@ -59,7 +60,8 @@ class Live:
         check_same_shot(scene, shown.field.about.get("shot"), "the reflectance field", self.layer)
         self.folder = shown.field.folder
         self.written = (self.folder / "field.json").stat().st_mtime_ns
-        self.viewer = Viewer(Preview([take.field for take in shown.takes]))
+        fields = [take.field for take in shown.takes]
+        self.viewer = Viewer(Preview(fields, holds_out(scene, self.layer)))
         self.maps = maps.Maps()
         self.shape = shown.field.shape
         # outside a render region a picture is empty

@@ -86,7 +86,7 @@ def mix_to_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> Path:
     image = np.zeros_like(whole.image)
     left = np.ones(whole.image.shape[:2], np.float32)
     for name, share in layers.parts_of(scene, whole, shown.field, world).items():
-        gain = mix.of(f"{settings.layer_prefix}{layers.layer_name(name)}")
+        gain = mix.of(layers.channel_name(scene, name))
         image += part_of(whole, share).image * gain.astype(np.float32)
         left -= share
     # light from where no patch is: seen, though it lights nothing
@@ -103,7 +103,7 @@ def _layer_of(scene: bpy.types.Scene, thing: bpy.types.Object) -> str:
     """The layer that a lamp is in."""
     groups = {g.name for layer in scene.view_layers for g in layer.lightgroups}
     name = layers.OWN + (f"_{safe_name(thing.lightgroup)}" if thing.lightgroup in groups else "")
-    return f"{scene.arto.layer_prefix}{layers.layer_name(name)}"
+    return layers.channel_name(scene, name)
 
 
 def _lamps(scene: bpy.types.Scene) -> list[bpy.types.Object]:

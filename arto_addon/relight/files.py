@@ -45,6 +45,7 @@ def write(shown: Shown, ready: Ready, made: Made, about: dict[str, str]) -> Step
         "look": ready.lit.look,
         "turn": f"{math.degrees(ready.whole.turn):.4g}" if ready.whole.turn else "",
         "world by rays": ready.by_rays,
+        "world below 0": ready.below,
         "changed since capture": "; ".join(ready.changed),
     }
     about = {name: text for name, text in about.items() if text}
@@ -53,7 +54,7 @@ def write(shown: Shown, ready: Ready, made: Made, about: dict[str, str]) -> Step
     if settings.layers != "OFF":
         name = plate.layers_file(path).name
         if settings.layers_files == "EACH":
-            name = f"{path.stem}_{settings.layer_prefix}*.exr"
+            name = f"{path.stem}_{layers.prefix_of(scene)}*.exr"
         about[plate.LAYERS.removeprefix("arto.")] = name
     if plate.window_of(scene).crop:
         about[plate.CROPPED.removeprefix("arto.")] = plate.full_file(path).name

@@ -6,7 +6,9 @@ scene's frame, brought to the picture's size.
 
 from __future__ import annotations
 
+import contextlib
 import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,12 +17,17 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core import exr
 from ...core.errors import SceneError
+from ...core.exr_window import Box
 from ..blender.compositing import choose, compositor, studio, turned_off
+from ..blender.pictures import put
 from ..stage.stage import picture_size
 
 # How a picture of another shape fills the frame, by the camera's word for it.
 _FILLS = {"STRETCH": "Stretch", "FIT": "Fit", "CROP": "Crop"}
+# No finer than so many times the picture: that is enough for footage of 8K in a preview.
+_FINEST = 8
 # Of an image's user, what an image node of the compositor has too.
 _TIMING = ("frame_duration", "frame_start", "frame_offset", "use_cyclic", "use_auto_refresh")
 
@@ -39,31 +46,152 @@ class Footage:
         return self.source.name
 
     def read(self, scene: bpy.types.Scene) -> NDArray[np.float32]:
-        """The footage at the scene's frame -> (H, W, 3), scene-linear, of the picture's size.
+        """The footage at the scene's frame -> (H, W, 3), scene-linear, of the picture's size. What
+        is seen of it is opaque, whatever alpha its file has.
 
         Raises SceneError where Blender cannot read it, or it is no picture.
         """
-        with studio("ARTO Footage") as on:
-            scale = on.tree.nodes.new("CompositorNodeScale")
-            choose(scale, "Type", "Render Size")
-            choose(scale, "Frame Type", _FILLS[self.fills])
-            on.tree.links.new(self._node(on.tree).outputs["Image"], scale.inputs["Image"])
-            on.scene.render.fps, on.scene.render.fps_base = scene.render.fps, scene.render.fps_base
-            on.scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
-            size = picture_size(scene)
-            found = on.composite(scale.outputs["Image"], size, "reading the footage")
-        # what Blender cannot read is nothing to it, and it says no word
-        if found.shape[1::-1] != size or not found[..., 3].any():
+        data, display = self._windows(scene)
+        frame = _with_overscan(scene, display)
+        if not data == display == frame:
+            return self._placed(scene, data, frame)
+        width, height = picture_size(scene)
+        fine = self._finer(scene)
+        found = self._composited(scene, (fine * width, fine * height), opaque=True)
+        # a picture of another size fades out at its rim, and its alpha, which was 1, with it
+        covered = found[..., 3:]
+        rgb = np.divide(
+            found[..., :3], covered, out=np.zeros_like(found[..., :3]), where=covered > 0
+        )
+        if (
+            not rgb.any()
+            and not self._composited(scene, (width, height), opaque=False)[..., 3].any()
+        ):
+            # what Blender cannot read is nothing to it, and it says no word
             raise SceneError(
                 f"Blender shows nothing of the footage '{self.name}' at frame "
                 f"{scene.frame_current}: look whether its file is there and whole"
             )
-        if bad := int((~np.isfinite(found)).any(axis=-1).sum()):
+        if bad := int((~np.isfinite(rgb)).any(axis=-1).sum()):
             raise SceneError(
                 f"the footage '{self.name}' has {bad} pixels that are infinite or not a number: "
                 "repair them, or choose another"
             )
-        return np.ascontiguousarray(found[..., :3])
+        return np.ascontiguousarray(rgb.reshape(height, fine, width, fine, 3).mean(axis=(1, 3)))
+
+    def _composited(
+        self, scene: bpy.types.Scene, size: tuple[int, int], opaque: bool
+    ) -> NDArray[np.float32]:
+        """What Blender's compositor shows of it in a frame of a size, (H, W, 4)."""
+        with studio("ARTO Footage") as on:
+            scale = on.tree.nodes.new("CompositorNodeScale")
+            choose(scale, "Type", "Render Size")
+            choose(scale, "Frame Type", _FILLS[self.fills])
+            shown = self._picture(self._node(on.tree))
+            if opaque:
+                alpha = on.tree.nodes.new("CompositorNodeSetAlpha")
+                choose(alpha, "Type", "Replace Alpha")
+                alpha.inputs["Alpha"].default_value = 1.0
+                on.tree.links.new(shown, alpha.inputs["Image"])
+                shown = alpha.outputs[0]
+            on.tree.links.new(shown, scale.inputs["Image"])
+            on.scene.render.fps, on.scene.render.fps_base = scene.render.fps, scene.render.fps_base
+            on.scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
+            return on.composite(scale.outputs["Image"], size, "reading the footage")
+
+    def _picture(self, node: Any) -> bpy.types.NodeSocket:
+        """The picture among what a node puts out: of a file of layers there is the beauty. Raises
+        SceneError."""
+        for name in ("Image", "Combined"):
+            if name in node.outputs:
+                return node.outputs[name]
+        raise SceneError(
+            f"the footage '{self.name}' is a file of layers, and none is a plain picture: write it "
+            "with R, G, B at its root"
+        )
+
+    def _finer(self, scene: bpy.types.Scene) -> int:
+        """How many times finer than the picture it is looked at: what is larger than the picture is
+        averaged, where Blender would take some of its pixels."""
+        data, _ = self._windows(scene)
+        sizes = zip(_size(data), picture_size(scene), strict=True)
+        return min(max(round(min(there / wanted for there, wanted in sizes)), 1), _FINEST)
+
+    def _windows(self, scene: bpy.types.Scene) -> tuple[Box, Box]:
+        """The pixels that there are, and those of its frame.
+
+        Blender shows the pixels of an EXR alone, wherever they stand in its frame.
+        """
+        file = self._file(scene)
+        if file is not None and file.suffix.lower() == ".exr" and file.is_file():
+            return exr.windows(file)
+        width, height = _pixels(self.source, file)
+        data = 0, 0, width - 1, height - 1
+        return data, data
+
+    def _file(self, scene: bpy.types.Scene) -> Path | None:
+        """The file that is shown at the scene's frame, as far as that can be told."""
+        source = self.source
+        if source.source not in {"FILE", "SEQUENCE"} or getattr(source, "packed_file", None):
+            return None
+        path = Path(bpy.path.abspath(source.filepath, library=source.library))
+        digits = re.search(r"(\d+)(?=\D*$)", path.stem)
+        if source.source == "FILE" or not digits:
+            return path
+        if isinstance(source, bpy.types.MovieClip):
+            number = int(digits[1]) + scene.frame_current - source.frame_start + source.frame_offset
+        elif self.timing is None:
+            number = scene.frame_current
+        else:
+            number = scene.frame_current - self.timing.frame_start + 1 + self.timing.frame_offset
+        text = f"{max(number, 0):0{len(digits[1])}d}"
+        now = path.with_name(
+            path.stem[: digits.start()] + text + path.stem[digits.end() :] + path.suffix
+        )
+        return now if now.is_file() else path
+
+    def _placed(self, scene: bpy.types.Scene, data: Box, display: Box) -> NDArray[np.float32]:
+        """The footage where its pixels stand in its frame; black where it has none."""
+        found = self._alone(scene, _size(data))
+        frame = np.zeros((*_size(display)[::-1], 4), np.float32)
+        frame[..., 3] = 1
+        mine, its = (
+            tuple(
+                slice(low - box[i], max(high + 1, low) - box[i])
+                for i, low, high in (
+                    (i, max(data[i], display[i]), min(data[i + 2], display[i + 2])) for i in (1, 0)
+                )
+            )
+            for box in (display, data)
+        )
+        frame[mine] = found[its]
+        image = put(f"ARTO {self.name}", frame)
+        try:
+            return Footage(image, None, self.fills).read(scene)
+        finally:
+            bpy.data.images.remove(image)
+
+    def _alone(self, scene: bpy.types.Scene, size: tuple[int, int]) -> NDArray[np.float32]:
+        """Its pixels without their frame -> (H, W, 4), opaque. Where these stand elsewhere than in
+        its middle, Blender's compositor (5.2) shifts them."""
+        file = self._file(scene)
+        if file is None or file.suffix.lower() != ".exr":
+            return self._composited(scene, size, opaque=True)
+        image = bpy.data.images.load(str(file))
+        try:
+            image.colorspace_settings.name = self.source.colorspace_settings.name
+            if tuple(image.size) != size:
+                raise SceneError(
+                    f"the footage '{self.name}' is a file of layers whose pixels are others than "
+                    "those of its frame: write it with R, G, B alone, or with all of its frame"
+                )
+            pixels = np.empty(4 * size[0] * size[1], np.float32)
+            image.pixels.foreach_get(pixels)
+        finally:
+            bpy.data.images.remove(image)
+        found = pixels.reshape(size[1], size[0], 4)[::-1].copy()
+        found[..., 3] = 1
+        return found
 
     def _node(self, tree: Any) -> Any:
         if isinstance(self.source, bpy.types.MovieClip):
@@ -86,6 +214,33 @@ class Footage:
             return ""
         path = Path(bpy.path.abspath(image.filepath, library=image.library))
         return "" if path.exists() else str(path)
+
+
+def _with_overscan(scene: bpy.types.Scene, frame: Box) -> Box:
+    """A frame of the size that is delivered, with the overscan that the scene's picture has."""
+    more = scene.arto.overscan
+    if _size(frame) != tuple(side - 2 * more for side in picture_size(scene)):
+        return frame
+    x0, y0, x1, y1 = frame
+    return x0 - more, y0 - more, x1 + more, y1 + more
+
+
+def _size(box: Box) -> tuple[int, int]:
+    """Width and height."""
+    return box[2] - box[0] + 1, box[3] - box[1] + 1
+
+
+def _pixels(source: Any, file: Path | None) -> tuple[int, int]:
+    """Width and height of an image or clip; of a sequence those of a file of it."""
+    if min(source.size) or file is None or not file.is_file():
+        return tuple(source.size)
+    with contextlib.suppress(RuntimeError):  # which is said where it is read
+        image = bpy.data.images.load(str(file))
+        try:
+            return tuple(image.size)
+        finally:
+            bpy.data.images.remove(image)
+    return 0, 0
 
 
 def footage(scene: bpy.types.Scene) -> Footage | None:

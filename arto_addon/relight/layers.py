@@ -6,6 +6,7 @@ stand in a node group of Blender's compositor with a gain and a tint for each.
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -45,17 +46,19 @@ if TYPE_CHECKING:
 
 # The layers of no part of the world's light: the scene's own lamps, and the world that is seen.
 OWN, BEHIND = "own", "behind"
+# What else a mixer has sockets of, which an empty prefix lets a group be called.
+SOCKETS = {"Exposure", "Footage", "Image", "Combined", "Alpha"}
 # A part of the light with less than this share of the lamps has none of them.
 LEAST_LAMPS = 1e-4
 # The largest number that a half float holds.
 HALF = 65504.0
 
 
-def _check(groups: Any) -> None:
-    """Raise SceneError where two layers would have one name."""
-    taken = {layer_name(name) for name in (REST, OWN, BEHIND)}
-    for group in groups:
-        name = layer_name(group.name)
+def _check(scene: bpy.types.Scene) -> None:
+    """Raise SceneError where two layers would have one name, or a name that is the mixer's own."""
+    taken = {channel_name(scene, name) for name in (REST, OWN, BEHIND)} | SOCKETS
+    for group in scene.arto.groups:
+        name = channel_name(scene, group.name)
         if name in taken:
             raise SceneError(f"two layers would be called '{name}': rename the group")
         taken.add(name)
@@ -73,7 +76,7 @@ def parts_of(
         found = by_faces(environment, field.hemicube)
         # light from where no face is lights nothing: no layer has it
         return {k: v for k, v in found.items() if v.any()}
-    _check(settings.groups)
+    _check(scene)
     masks = {}
     for group in settings.groups:
         if group.mask:
@@ -156,7 +159,7 @@ def write(
     """Write layers that sum to a plate (H, W, 4), and it; says how far their sum is off. Raises
     SceneError, ExrError."""
     settings = scene.arto
-    names = [f"{settings.layer_prefix}{layer_name(name)}" for name in layers]
+    names = [channel_name(scene, name) for name in layers]
     each = settings.layers_files == "EACH"
     files = layer_files(path, names) if each else {}
     parts = share_out(list(layers.values()), beauty[..., :3])
@@ -203,6 +206,16 @@ def layer_files(path: Path, names: list[str]) -> dict[str, Path]:
         taken.add(file.name.lower())
         found[name] = file
     return found
+
+
+def prefix_of(scene: bpy.types.Scene) -> str:
+    """What the names of layers begin with: as the artist has it, but for what parts names."""
+    return re.sub(r"[^\w-]", "_", scene.arto.layer_prefix)
+
+
+def channel_name(scene: bpy.types.Scene, layer: str) -> str:
+    """What a layer is called in files and in the mixer."""
+    return f"{prefix_of(scene)}{layer_name(layer)}"
 
 
 def layer_name(name: str) -> str:

@@ -41,7 +41,6 @@ def relight_many(
     if turns > 1 and frames:
         raise SceneError("a turntable is of one frame: leave one of the two out")
     scene.view_layers[view_layer].update()
-    base = paths.relit_file(scene)
     done: list[Path] = []
     total = max(len(worlds), 1) * max(turns, len(frames), 1)
     still = None if frames else _shown(scene, view_layer, None)
@@ -52,6 +51,9 @@ def relight_many(
                 scene.view_layers[view_layer].update()
                 still = _shown(scene, view_layer, still)
             assert still is not None
+            # at this frame: the output may have its number in it
+            base = paths.relit_file(scene)
+            numbered = frames and paths.numbers_frames(scene)
             every = [(file, turn) for file in worlds or [None] for turn in range(turns)]
             most = max(1, together(still.field) // len(still.takes))
             for first in range(0, len(every), most):
@@ -60,6 +62,7 @@ def relight_many(
                     ready: list[Ready] = []
                     for file, turn in every[first : first + most]:
                         number = frame if frames else turn + 1 if turns > 1 else None
+                        number = None if numbered else number
                         path = _named(base, file, number)
                         world = _lent(lent, scene, view_layer, file, turn / turns)
                         look = file.stem if file else scene.arto.look

@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.catcher import catch_seen, of_ground
+from ...core.catcher import catch_seen, held_out, of_ground
 from ...core.environment import Environment
 from ...core.errors import FieldError
 from ...core.field import Field
@@ -27,7 +27,7 @@ from ..shot.shot import check_same_shot, layer_of
 from ..shot.status import changed_since
 from ..work import Progress, Steps
 from ..world import kept
-from ..world.background import background, background_with_holes, holds_out
+from ..world.background import background, background_with_holes, holds_out, without_holes
 from ..world.check import check_world, differs_by_rays
 from ..world.lamp_render import brightness, lamp_light, lamp_samples, region_of
 from . import denoise, files, light_key, plate
@@ -126,6 +126,10 @@ class Shown:
         rest, lamps = (replace(part, turn=whole.turn) for part in (found.rest, found.lamps))
         return Split(rest, lamps, found.share)
 
+    def held_out(self, *alphas: NDArray[np.float32]) -> NDArray[np.float32] | float:
+        """How much of each pixel is cut out before the ground, from its takes' alphas, (H, W)."""
+        return held_out(*alphas) if holds_out(self.scene, self.layer) else 0.0
+
     @cached_property
     def guides(self) -> dict[str, NDArray]:
         return denoise.guides_of(self.field)
@@ -188,6 +192,7 @@ class Ready:
     light: PatchLight
     changed: list[str]
     by_rays: str
+    below: str
     laps: Laps
 
 
@@ -232,6 +237,10 @@ def make_ready(shown: Shown, lit: Light) -> Steps:
     if by_rays := differs_by_rays(world):
         yield Progress(0.0, f"the world is {by_rays}")
     whole = kept.environment(scene, settings.environment_width, layer, lit.world)
+    below = ""
+    if whole.below_zero > LEAST_SHARE:
+        below = f"{whole.below_zero:.1%} of its light is below 0"
+        yield Progress(0.0, f"the world is no light: {below}, which no layer and no shadow has")
     laps.lap("world")
     found = shown.split(whole)
     parts, lamps, together = yield from _lamps(shown, found)
@@ -242,7 +251,9 @@ def make_ready(shown: Shown, lit: Light) -> Steps:
     yield Progress(0.5, "bringing the environment to the patches")
     light = PatchLight(found.rest if parts else whole, field.hemicube)
     laps.lap("light")
-    return Ready(lit, world, whole, found, rendered, lamps, together, light, changed, by_rays, laps)
+    return Ready(
+        lit, world, whole, found, rendered, lamps, together, light, changed, by_rays, below, laps
+    )
 
 
 def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> Steps:
@@ -254,13 +265,14 @@ def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> S
     summed = []
     for take, picture, parts in zip(shown.takes, pictures, ready.rendered, strict=True):
         summed.append((yield from _with_own(take, ready, picture, parts)))
-    by = shown.takes
+    by, held = shown.takes, 0.0
     if len(by) > 1:
         # of the first two what is divided by each other, and alike denoised: `of_ground`
         whole, ground, apart = summed
         apart = [np.maximum(part, 0) for part in apart]
+        held = shown.held_out(*(picture[..., 3] for picture in pictures))
         things = [np.dstack([part, pictures[-1][..., 3]]) for part in apart]
-        divided = [of_ground(*parts) for parts in zip(whole, ground, things, strict=True)]
+        divided = [of_ground(*parts, held) for parts in zip(whole, ground, things, strict=True)]
         summed, by = [*map(list, zip(*divided, strict=True)), apart], [by[0], by[0], by[-1]]
     lap("relight")
     denoised = "no"
@@ -282,7 +294,7 @@ def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> S
     np.maximum(picture, 0, out=picture)
     if len(pictures) > 1:
         left, bare, apart = pictures
-        caught = catch_seen(left[..., :3], bare[..., :3], apart, bare[..., 3])
+        caught = catch_seen(left[..., :3], bare[..., :3], apart, bare[..., 3], held)
         picture = caught.plate
         lap("catcher")
     things = picture[..., :3].copy()
@@ -351,6 +363,14 @@ def _behind(shown: Shown, lit: Light, picture: NDArray[np.float32], has_lamps: b
     scene, layer = shown.scene, shown.layer
     captured = region_of(shown.field)
     if holds_out(scene, layer):
+        if len(shown.takes) > 1:
+            # what is behind is seen through the shadows, and in the holes not at all
+            solid = without_holes(scene, captured, layer, lit.world)
+            there = background(scene, captured, layer, has_lamps, lit.world)
+            seen = np.clip(solid - picture[..., 3], 0, 1)
+            picture[..., :3] += seen[..., None] * there
+            picture[..., 3] = solid
+            return
         behind = background_with_holes(scene, captured, layer, lit.world)
         picture[..., :3] += behind[..., :3]
         picture[..., 3] = behind[..., 3]

@@ -283,6 +283,30 @@ def relit_name(scene: bpy.types.Scene, look: str | None = None) -> str:
 
 
 _PLAIN = "relit"  # a plate's ending without a look
+# How names of files end that stand beside a plate; numbers are those of frames.
+_BESIDE = re.compile(
+    r"(^|_)(catcher|light|layers|data|comp|composite|world|full|verify|\d{4,})$", re.IGNORECASE
+)
+_HASHES = re.compile(r"([._-]?)(#+)(?=[^#]*$)")
+
+
+def _of_look(look: str) -> str:
+    """What of a file's name is a look's. One that is called as what stands beside the plate of
+    another has a mark, so that neither is written over the other."""
+    name = safe_name(look)
+    return f"{name}~{short_hash(look)}" if _BESIDE.search(name) else name
+
+
+def _numbered(stem: str, frame: int) -> tuple[re.Match[str] | None, str]:
+    """Where a file's name has hashes, with what parts them from it, and what stands there at a
+    frame: as many digits as there are hashes."""
+    mark = _HASHES.search(stem)
+    return (mark, f"{mark[1]}{frame:0{len(mark[2])}d}") if mark else (None, "")
+
+
+def numbers_frames(scene: bpy.types.Scene) -> bool:
+    """Whether the output has a place for the frame's number."""
+    return bool(scene.arto.output) and bool(_HASHES.search(Path(scene.arto.output).stem))
 
 
 def relit_file(scene: bpy.types.Scene, look: str | None = None) -> Path:
@@ -293,19 +317,26 @@ def relit_file(scene: bpy.types.Scene, look: str | None = None) -> Path:
     mark = f"~{name.rpartition('~')[2]}" if "~" in name else ""
     if scene.arto.output:
         path = home.absolute(scene.arto.output)
+        if scene.arto.output.endswith(("/", "\\")):
+            path = path / (Path(home.file()).stem or _PLAIN)
         if path.suffix.lower() in _PICTURES:
             path = path.with_suffix(".exr")
         elif path.suffix.lower() != ".exr":  # a version or a dot of the name's own
             path = path.with_name(path.name + ".exr")
         # a copied scene has the output of the one it was copied from
         shared = any(s.arto.output == scene.arto.output for s in bpy.data.scenes if s != scene)
-        parts = [*([scene.name] if shared else []), *([look] if look else [])]
-        return path.with_name("_".join([path.stem, *map(safe_name, parts)]) + ".exr")
+        parts = [*([safe_name(scene.name)] if shared else []), *([_of_look(look)] if look else [])]
+        # hashes are the frame's number, which is what stands last in a name
+        stem, mark, number = path.stem, *_numbered(path.stem, scene.frame_current)
+        if mark:
+            stem = stem[: mark.start()] + "".join(f"_{part}" for part in parts) + number
+            return path.with_name(stem + path.stem[mark.end() :] + ".exr")
+        return path.with_name("_".join([stem, *parts]) + ".exr")
     if not home.file():
         raise SceneError(
             "this .blend was never saved, so the relit picture has no place to go: save it, or "
             "set ARTO's output to an absolute path"
         )
     blend = Path(home.file())
-    parts = [safe_name(scene.name), safe_name(look or _PLAIN)] if name else [_PLAIN]
+    parts = [safe_name(scene.name), _of_look(look or _PLAIN)] if name else [_PLAIN]
     return blend.with_name("_".join([blend.stem, *parts]) + mark + ".exr")

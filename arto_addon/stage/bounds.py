@@ -32,8 +32,9 @@ class Rendered:
     catchers: list[str] = field(default_factory=list)
     flagged: set[Name] = field(default_factory=set)
     things: set[Name] = field(default_factory=set)
-    # what makes instances of catchers
+    # what makes instances of catchers, and what is one as the instance of one alone
     makers: set[Name] = field(default_factory=set)
+    made: set[Name] = field(default_factory=set)
 
     def bounds(self) -> tuple[tuple[float, float, float], float]:
         """Centre and radius. Raises SceneError where there is nothing to see."""
@@ -45,7 +46,7 @@ class Rendered:
 
     def check(self) -> None:
         """Raise SceneError where shadow catchers cannot be told from the things on them."""
-        for name, _ in sorted(self.things & (self.flagged | self.makers)):
+        for name, _ in sorted(self.things & (self.flagged | self.makers | self.made)):
             raise SceneError(
                 f"'{name}' is in the picture both as a shadow catcher and as a thing, or makes "
                 "instances of one: make the catcher an object of its own"
@@ -63,6 +64,7 @@ class Rendered:
             # what is made by a catcher is one
             self.catchers.append(one.name)
             self.flagged.add(_name(parent))
+            self.made.add(_name(one))
         else:
             self.things.add(_name(one))
 

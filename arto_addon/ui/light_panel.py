@@ -11,6 +11,7 @@ from ...core import exr
 from ...core.errors import ArtoError
 from ..blender.compositing import compositor
 from ..live import live
+from ..relight.layers import prefix_of
 from ..relight.plate import name_of
 from ..relight.present import MIX
 from ..shot import paths, status
@@ -131,7 +132,7 @@ def _layers(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
         if tint is None or socket.is_linked:
             continue
         row = column.row(align=True)
-        name = socket.name.removeprefix(context.scene.arto.layer_prefix)
+        name = socket.name.removeprefix(prefix_of(context.scene))
         row.prop(socket, "default_value", text=name, translate=False)
         sub = row.row(align=True)
         sub.scale_x = 0.3

@@ -289,7 +289,8 @@ class RelightSettings:
     )
     output: StringProperty(
         name="Relit Picture",
-        description="The relit EXR; empty: beside the .blend, named after it",
+        description="The relit EXR, #### for the frame's number; empty: beside the .blend, named "
+        "after it",
         subtype="FILE_PATH",
         default="",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},

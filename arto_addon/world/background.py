@@ -14,8 +14,10 @@ from ...core.region import Region
 from ..blender.nodes import shader_tree, trees
 from ..blender.output import float_exr, write_to
 from ..shot.shot import layer_of
+from ..stage.bounds import rendered
 from ..stage.settings import prepare
 from ..stage.stage import Stage, free_mark, picture_size, set_region, stage
+from ..stage.takes import WHOLE, take
 from ..work import Render, blocking_render
 from .check import check_world
 
@@ -120,18 +122,43 @@ def background_with_holes(
     width, height = picture_size(scene)
     out = np.zeros((height, width, 4), np.float32)
     with stage(scene, view_layer) as on:
-        _set(on, world, region, even=True)
-        # a world for the camera alone, in a light group of its own: what else is lit is no matter
-        rays = on.scene.world.cycles_visibility
-        for prop in rays.bl_rna.properties:
-            if prop.type == "BOOLEAN" and not prop.is_readonly and prop.identifier != "camera":
-                setattr(rays, prop.identifier, False)
-        group = free_mark() + "behind"
-        on.scene.world.lightgroup = group
-        on.scene.view_layers[0].lightgroups.add(name=group)
-        on.scene.cycles.max_bounces = 0
+        group = _set_behind(on, world, region)
         parts = _render(on)
     light = next(pixels for name, pixels in parts.items() if name.endswith(group))
     whole = next(pixels for name, pixels in parts.items() if name.endswith("Combined"))
     out[region.slices] = np.dstack([light[..., :3], whole[..., 3:]])
     return out
+
+
+def without_holes(
+    scene: bpy.types.Scene,
+    region: Region,
+    view_layer: str,
+    world: bpy.types.World | None = None,
+) -> NDArray[np.float32]:
+    """Where the picture of a scene with shadow catchers and its world is opaque -> (H, W); 0 in its
+    holes, and outside the region. The catchers are there as ordinary things."""
+    world = world or check_world(scene, view_layer)
+    width, height = picture_size(scene)
+    out = np.zeros((height, width), np.float32)
+    with stage(scene, view_layer) as on, take(rendered(on), WHOLE):
+        _set_behind(on, world, region)
+        parts = _render(on)
+    whole = next(pixels for name, pixels in parts.items() if name.endswith("Combined"))
+    out[region.slices] = whole[..., 3]
+    return out
+
+
+def _set_behind(on: Stage, world: bpy.types.World, region: Region) -> str:
+    """The stage with the world for the camera alone, in a light group of its own, whose name this
+    is: what else is lit is no matter."""
+    _set(on, world, region, even=True)
+    rays = on.scene.world.cycles_visibility
+    for prop in rays.bl_rna.properties:
+        if prop.type == "BOOLEAN" and not prop.is_readonly and prop.identifier != "camera":
+            setattr(rays, prop.identifier, False)
+    group = free_mark() + "behind"
+    on.scene.world.lightgroup = group
+    on.scene.view_layers[0].lightgroups.add(name=group)
+    on.scene.cycles.max_bounces = 0
+    return group

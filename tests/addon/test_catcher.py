@@ -8,14 +8,12 @@ import bpy
 import numpy as np
 import pytest
 from arto.arto_addon import fit, work
-from arto.arto_addon.blender.output import float_exr
 from arto.arto_addon.capture import capture, room
 from arto.arto_addon.capture.sequence import capture_frames
 from arto.arto_addon.relight import plate
 from arto.arto_addon.relight.many import relight_many
 from arto.arto_addon.relight.present import present_frames
 from arto.arto_addon.shot import paths
-from arto.arto_addon.stage.stage import stage
 from arto.core import exr
 from arto.core.errors import CancelledError, FieldError, SceneError
 from arto.core.field import Field
@@ -33,30 +31,7 @@ from scene_tools import (
     smooth,
     snapshot,
 )
-from shot_tools import relit_and_share, with_catcher
-
-
-def cycles_catcher(scene, samples, seed, tmp_path, share=True) -> np.ndarray:
-    """What Cycles renders with its own catcher -> (H, W, 3), its Shadow Catcher pass; or else
-    (H, W, 4), its plate, which has the shadows where there is no such pass."""
-    with stage(scene, scene.view_layers[0].name) as on:
-        float_exr(on.scene.render)
-        on.scene.view_layers[0].cycles.use_pass_shadow_catcher = share
-        cycles = on.scene.cycles
-        cycles.samples, cycles.seed, cycles.sample_clamp_indirect = samples, seed, 0
-        cycles.use_adaptive_sampling = cycles.use_denoising = False
-        on.scene.render.filepath = str(tmp_path / "catcher.exr")
-        request = work.Render(on.scene.name, 0, "")
-        work.blocking_render(request)
-        request.check()
-    wanted = "Shadow Catcher" if share else "Combined"
-    (found,) = (p for n, p in exr.read(tmp_path / "catcher.exr").items() if n.endswith(wanted))
-    return found[..., :3] if share else found
-
-
-def bare_of(scene) -> np.ndarray:
-    """Where nothing stands before the ground."""
-    return Field(paths.field_folder(scene).parent / "things" / "field").layer("alpha") == 0
+from shot_tools import bare_of, cycles_catcher, relit_and_share, with_catcher
 
 
 def test_as_cycles_own_catcher(tmp_path):
@@ -141,6 +116,20 @@ def test_what_makes_a_catcher_must_not_be_a_thing(tmp_path):
     scene.objects["Matt"].show_instancer_for_render = True
     with pytest.raises(SceneError, match="an object of its own"):
         captured(scene)
+
+
+def test_what_an_instance_makes_a_catcher_must_not_be_a_thing(tmp_path):
+    """Hidden as a thing it would be hidden as a catcher, and shadows on it were too dark."""
+    scene = with_catcher(tmp_path, samples=4, patches=1)
+    boxes = bpy.data.collections.new("Boxes")
+    boxes.objects.link(scene.objects["Matt"])
+    empty = instance_of(boxes, scene.collection)
+    empty.location, empty.is_shadow_catcher = (0, 2, 0), True
+    with pytest.raises(SceneError, match="'Matt' is in the picture both as"):
+        captured(scene)
+    # by itself it may be one
+    scene.collection.objects.unlink(scene.objects["Matt"])
+    captured(scene)
 
 
 def test_an_animated_flag_is_refused(tmp_path):

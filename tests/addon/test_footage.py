@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+import OpenImageIO
 import pytest
 from arto.arto_addon import work
 from arto.arto_addon.blender.colour import working_space
@@ -150,3 +151,125 @@ def test_footage_that_is_no_picture_is_said_before_anything_is_written(tmp_path,
     with pytest.raises(SceneError, match=match):
         relit_and_share(scene)
     assert not paths.relit_file(scene).exists() and len(bpy.data.scenes) == scenes
+
+
+def in_file(path, pixels, data=(0, 0), display=None):
+    """A float EXR (H, W, C) as another program writes it, its pixels from `data` (x, y) on."""
+    height, width, channels = pixels.shape
+    spec = OpenImageIO.ImageSpec(width, height, channels, "float")
+    spec.x, spec.y = data
+    spec.full_width, spec.full_height = display or (width, height)
+    file = OpenImageIO.ImageOutput.create(str(path))
+    assert file.open(str(path), spec) and file.write_image(np.ascontiguousarray(pixels))
+    file.close()
+    return path
+
+
+def chosen(scene, path, space=None):
+    scene.arto.footage = bpy.data.images.load(str(path))
+    if space:
+        scene.arto.footage.colorspace_settings.name = space
+    return footage(scene)
+
+
+RAMPS = np.random.default_rng(1).uniform(0.1, 2, (18, 24, 3)).astype(np.float32)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (9, 12), (17, 23)])
+def test_small_footage_is_whole_up_to_its_rim(tmp_path, size):
+    """Blender lets it fade out there: an even grey was an eighth of itself in the corners."""
+    scene = with_catcher(tmp_path)
+    found = chosen(scene, in_file(tmp_path / "grey.exr", np.full((*size, 3), 0.5, np.float32)))
+    np.testing.assert_allclose(found.read(scene), 0.5, rtol=1e-5)
+
+
+@pytest.mark.parametrize("factor", [2, 3, 4])
+@pytest.mark.parametrize("kind", ["file", "sequence"])
+def test_large_footage_is_averaged(tmp_path, factor, kind):
+    scene = with_catcher(tmp_path)
+    fine = np.random.default_rng(0).uniform(0, 2, (18 * factor, 24 * factor, 3))
+    found = chosen(scene, in_file(tmp_path / "fine_0001.exr", fine.astype(np.float32)))
+    if kind == "sequence":
+        scene.arto.footage.source = "SEQUENCE"
+        found = footage(scene)
+    means = fine.reshape(18, factor, 24, factor, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(found.read(scene), means, rtol=1e-4)
+
+
+@pytest.mark.parametrize("space", ["Linear Rec.709", "AgX Log"])
+@pytest.mark.parametrize("kind", ["crop", "overscan", "beside"])
+def test_footage_stands_where_its_data_window_is(tmp_path, space, kind):
+    """A file that is cropped, or has more than its frame: Blender shows its pixels as the frame."""
+    scene = with_catcher(tmp_path)
+    whole = chosen(scene, in_file(tmp_path / "whole.exr", RAMPS), space).read(scene)
+    assert (np.abs(whole - RAMPS).max() < 1e-5) == (space == "Linear Rec.709")
+    if kind == "crop":
+        there = np.s_[5:14, 6:18]
+        path = in_file(tmp_path / "part.exr", RAMPS[there], (6, 5), (24, 18))
+    elif kind == "overscan":
+        there, more = np.s_[:, :], np.pad(RAMPS, ((2, 2), (3, 3), (0, 0)), constant_values=9)
+        path = in_file(tmp_path / "part.exr", more, (-3, -2), (24, 18))
+    else:
+        there = np.s_[10:, 20:]
+        more = np.pad(RAMPS[there], ((0, 4), (0, 5), (0, 0)))
+        path = in_file(tmp_path / "part.exr", more, (20, 10), (24, 18))
+    found = chosen(scene, path, space).read(scene)
+    expected = np.zeros_like(whole)
+    expected[there] = whole[there]
+    np.testing.assert_allclose(found, expected, atol=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["sequence", "clip"])
+def test_the_data_window_of_the_frame(tmp_path, kind):
+    """Each picture of a sequence has its own."""
+    scene = with_catcher(tmp_path)
+    for frame, x in ((1, 2), (2, 9)):
+        in_file(tmp_path / f"part.{frame:04d}.exr", RAMPS[4:9, x : x + 6], (x, 4), (24, 18))
+    if kind == "sequence":
+        chosen(scene, tmp_path / "part.0001.exr")
+        scene.arto.footage.source = "SEQUENCE"
+    else:
+        camera = scene.camera.data
+        camera.show_background_images = True
+        behind = camera.background_images.new()
+        behind.source = "MOVIE_CLIP"
+        behind.clip = bpy.data.movieclips.load(str(tmp_path / "part.0001.exr"))
+        behind.clip.frame_start = 11
+    for frame, x in ((1, 2), (2, 9)):
+        scene.frame_set(frame + 10 * (kind == "clip"))
+        expected = np.zeros_like(RAMPS)
+        expected[4:9, x : x + 6] = RAMPS[4:9, x : x + 6]
+        np.testing.assert_allclose(footage(scene).read(scene), expected, atol=1e-5)
+
+
+def test_footage_of_the_delivered_size_is_behind_what_is_delivered(tmp_path):
+    """With an overscan it was stretched over that, too."""
+    scene = with_catcher(tmp_path)
+    scene.arto.overscan = 3
+    found = chosen(scene, in_file(tmp_path / "delivered.exr", RAMPS[:12, :18])).read(scene)
+    np.testing.assert_allclose(found, np.pad(RAMPS[:12, :18], ((3, 3), (3, 3), (0, 0))), atol=1e-5)
+    # one that has the overscan itself, as pixels or beyond its frame, has it here
+    found = chosen(scene, in_file(tmp_path / "all.exr", RAMPS)).read(scene)
+    np.testing.assert_allclose(found, RAMPS, atol=1e-5)
+    path = in_file(tmp_path / "beyond.exr", RAMPS, (-3, -3), (18, 12))
+    np.testing.assert_allclose(chosen(scene, path).read(scene), RAMPS, atol=1e-5)
+
+
+def test_of_a_file_of_layers_the_beauty_is_the_footage(tmp_path):
+    """Blender has no output Image of it: that was a KeyError."""
+    scene = with_catcher(tmp_path)
+    path = tmp_path / "layers.exr"
+    whole = np.dstack([RAMPS, np.ones((18, 24, 1), np.float32)])
+    exr.write_layered(path, whole, {"LG_key": RAMPS / 2}, {}, working_space())
+    np.testing.assert_allclose(chosen(scene, path).read(scene), RAMPS, atol=1e-3)
+
+
+def test_footage_is_opaque(tmp_path):
+    """Whatever its alpha is, nothing is behind it."""
+    scene = with_catcher(tmp_path)
+    alpha = np.zeros((18, 24, 1), np.float32)
+    path = in_file(tmp_path / "clear.exr", np.dstack([RAMPS, alpha]))
+    np.testing.assert_allclose(chosen(scene, path).read(scene), RAMPS, atol=1e-5)
+    # black is a picture, and no missing one
+    path = in_file(tmp_path / "black.exr", np.zeros((18, 24, 3), np.float32))
+    assert not chosen(scene, path).read(scene).any()

@@ -422,3 +422,30 @@ def test_cryptomattes_are_handed_on(lit, tmp_path, interleaved):
     lit.arto.cryptomatte = str(tmp_path / "gone.exr")
     with pytest.raises(ExrError, match="no file"):
         relit(lit)
+
+
+@pytest.mark.parametrize("prefix", ["a.b", "..", "ü .x", "/x", "10"])
+def test_any_prefix_makes_names_that_programs_read(lit, tmp_path, prefix):
+    """A dot parts a layer from its channels: with one in a prefix the mixer found no layer. They
+    add up, and the mixer shows them."""
+    lit.arto.layer_prefix = prefix
+    picture, found = relit(lit)
+    assert len(found) == 7
+    assert not any(set(name) & set(". /") or name.isdigit() for name in found)
+    np.testing.assert_allclose(sum(found.values()), picture[..., :3], rtol=1e-5, atol=1e-6)
+    in_compositor(lit, bpy.data.node_groups["ARTO Relit Mix"], "Image")
+    np.testing.assert_allclose(composited(lit, tmp_path), picture, rtol=1e-4, atol=1e-5)
+    lit.arto.layers_files = "EACH"
+    path, _ = work.run(relight.relight(lit))
+    assert len(list(tmp_path.glob(exr.header(path)["arto.layers"]))) >= 7
+
+
+def test_a_group_is_not_called_as_a_socket_of_the_mixer(lit):
+    """Without a prefix: the mixer would have taken its own socket for the layer's."""
+    lit.arto.layers, lit.arto.layer_prefix = "GROUPS", ""
+    group_at(lit, "Exposure", 0, 0.5, 0.3)
+    with pytest.raises(SceneError, match="rename"):
+        relit(lit)
+    lit.arto.layer_prefix = "LG_"
+    _, found = relit(lit)
+    assert "LG_Exposure" in found

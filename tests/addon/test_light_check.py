@@ -84,6 +84,20 @@ def test_a_pane_that_throws_no_shadow(tmp_path):
     assert warning and "'Pane' throws no shadow" in warning["text"]
 
 
+@pytest.mark.parametrize("flag", ["visible_shadow", "visible_diffuse"])
+def test_a_soft_shadow_that_is_not_a_worlds(tmp_path, flag):
+    """Boxes on open ground that half of a world's light passes: what it is off by is small, and
+    all around."""
+    scene = small_scene(tmp_path)
+    assert said(scene) is None
+    for name in ("Matt", "Glossy"):
+        setattr(scene.objects[name], flag, False)
+        scene.objects[name].scale = (1.4, 1.4, 1.4)
+    warning = said(scene, patches=2)
+    words = "'Matt' throws no shadow" if flag == "visible_shadow" else "'Matt' is hidden from"
+    assert warning and words in warning["text"]
+
+
 def test_a_room_behind_such_glass_is_relit_as_cycles_renders_it(tmp_path):
     """Without sampled patches it had a fiftieth of its light."""
     scene, window = room(tmp_path)

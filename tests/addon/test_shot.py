@@ -13,7 +13,8 @@ import bpy
 import pytest
 from arto.arto_addon import fit, work
 from arto.arto_addon.capture import capture
-from arto.arto_addon.relight import plate
+from arto.arto_addon.relight import many, plate
+from arto.arto_addon.relight.verify import verify_file
 from arto.arto_addon.shot import paths, scene_id, status
 from arto.core.errors import BusyError, CaptureSetError, ShotError
 from scene_tools import captured, small_scene
@@ -245,3 +246,38 @@ def test_braces_and_signs_in_names(tmp_path):
     assert folder.parent.parent.parent == tmp_path / "arto" / "shot"
     assert os.path.commonpath([folder, tmp_path]) == str(tmp_path)
     assert status.capture_line(scene)[1]
+
+
+@pytest.mark.parametrize("name", ["layers", "Catcher", "key_light", "0007", "verify"])
+def test_no_look_is_written_over_what_stands_beside_a_plate(scene, tmp_path, name):
+    """The layers of a plate are beside it as `_layers`: a look of that name was written over
+    them."""
+    for output in (str(tmp_path / "plate.exr"), ""):
+        scene.arto.output = output
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+        scene = bpy.context.scene
+        other = name.rpartition("_")[0]
+        plates = [paths.relit_file(scene, look) for look in ("", other, name, f"{name}~x")]
+        kinds = (plate.layers_file, plate.share_file, plate.light_file, verify_file)
+        beside = {kind(path).name.lower() for kind in kinds for path in plates}
+        beside |= {many._named(path, None, 7).name for path in plates}
+        assert not beside & {path.name.lower() for path in plates}
+        assert len(set(plates)) == 3 + bool(other)
+
+
+def test_hashes_in_the_output_are_the_frames_number(scene, tmp_path):
+    """As in Blender's own output: padded, last in the name, also under a look."""
+    scene.frame_set(47)
+    for output, look, expected in (
+        ("beauty.####.exr", "", "beauty.0047.exr"),
+        ("beauty.####.exr", "key 2", "beauty_key 2.0047.exr"),
+        ("beauty_##", "", "beauty_47.exr"),
+        ("v###x#", "", "v###x47.exr"),
+        ("######.png", "", "000047.exr"),
+        ("plain.exr", "", "plain.exr"),
+    ):
+        scene.arto.output, scene.arto.look = str(tmp_path / output), look
+        assert paths.relit_file(scene) == tmp_path / expected
+    # a folder is one
+    scene.arto.output, scene.arto.look = f"{tmp_path}/plates/", ""
+    assert paths.relit_file(scene).parent == tmp_path / "plates"

@@ -125,3 +125,20 @@ def test_an_overscan_that_leaves_nothing_is_said_before_the_work(shot):
     assert not path.exists()
     shot.arto.overscan = -4
     assert shot.arto.overscan == 0  # the setting takes none
+
+
+def test_frames_are_numbered_where_the_output_has_hashes(shot, tmp_path):
+    """Under a look of a number, too: Blender's sequence finds the frames by the last number."""
+    shot.arto.layers, shot.arto.look = "OFF", "key 2"
+    shot.arto.output = str(tmp_path / "plates" / "sh010.###.exr")
+    background = shot.world.node_tree.nodes["Background"].inputs["Strength"]
+    for frame, strength in ((1, 1.0), (2, 3.0)):
+        background.default_value = strength
+        background.keyframe_insert("default_value", frame=frame)
+    done = work.run(relight_frames(shot, shot.view_layers[0].name, [1, 2]))
+    assert [path.name for path in done] == ["sh010_key 2.001.exr", "sh010_key 2.002.exr"]
+    (group,) = (g for g in bpy.data.node_groups if g.name.endswith("Frames"))
+    in_compositor(shot, group, "Image")
+    for frame, path in zip((1, 2), done, strict=True):
+        shot.frame_set(frame)
+        np.testing.assert_allclose(composited(shot, tmp_path), exr.read(path)[""], atol=1e-4)

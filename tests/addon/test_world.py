@@ -7,6 +7,9 @@ import math
 import bpy
 import numpy as np
 import pytest
+from arto.arto_addon import work
+from arto.arto_addon.blender.nodes import new_world
+from arto.arto_addon.relight import relight
 from arto.arto_addon.world.background import background
 from arto.arto_addon.world.bake import bake, rough
 from arto.arto_addon.world.check import differs_by_rays
@@ -14,6 +17,7 @@ from arto.core import exr
 from arto.core.errors import SceneError
 from arto.core.region import Region
 from scene_tools import hdri, set_colour, small_scene, smooth
+from shot_tools import run_all
 
 
 def test_plain_colour_with_strength(scene):
@@ -210,3 +214,21 @@ def test_an_hdri_that_is_cut_off_is_said(tmp_path, how):
         else:
             rough(scene, 64, scene.world)
     assert len(bpy.data.scenes) == scenes
+
+
+def test_a_world_below_zero_is_said(tmp_path):
+    """Its light would be taken away from things, and of a shadow nothing is less than none."""
+    scene = small_scene(tmp_path)
+    scene.arto.samples = 1
+    image = smooth()
+    hdri(scene, image)
+    run_all(scene)
+    path, _ = work.run(relight.relight(scene))
+    assert "arto.world below 0" not in exr.header(path)
+    image[20:40, 10:60] = -1
+    scene.world = new_world("Below")
+    hdri(scene, image)
+    steps: list = []
+    path, _ = work.run(relight.relight(scene), steps.append)
+    assert any("below 0" in step.text for step in steps)
+    assert "below 0" in exr.header(path)["arto.world below 0"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from arto.core.catcher import MOST, catch, catch_seen, of_ground, spread
+from arto.core.catcher import MOST, catch, catch_seen, held_out, of_ground, spread
 
 SIZE = (48, 64)
 
@@ -161,3 +161,30 @@ def test_what_glows_over_an_outline_is_no_light_on_the_ground(rng):
     alike = np.abs(catch_seen(left, seen, apart).share - shadow)[bare]
     before = np.abs(catch(smeared(whole), smeared(ground), apart).share - shadow)[bare]
     assert alike.max() < 0.05 < 1 < before.max()
+
+
+def test_footage_passes_a_hole(rng):
+    """Before a ground with a shadow something holds out: the footage is seen through it as it is,
+    beside it in the shadow, and at its outline in part, half way over a thing's too."""
+    ground, shadow = ground_of(rng)
+    covers, cut, colour = disc(0.06, 0.04), disc(0.2, 0.08), np.array([0.9, 0.4, 0.1])
+    # the thing stands behind what holds out
+    things = covers * (1 - cut)
+    there = (1 - cut) * (1 - covers)
+    whole = things[..., None] * colour + there[..., None] * shadow * ground
+    held = held_out(things + there, np.ones(SIZE), things)
+    np.testing.assert_allclose(held, cut * (held > 0), atol=1e-6)
+    assert cut[held == 0].max() < 5e-3
+    found = catch(whole, ground, plate(things, colour), held=held)
+    truth = cut[..., None] + there[..., None] * shadow
+    assert np.abs(found.share - truth).max() < 0.03
+    np.testing.assert_allclose(found.share[cut == 1], 1, atol=1e-6)
+    np.testing.assert_allclose(found.share[cut == 0], truth[cut == 0], atol=5e-3)
+
+
+def test_without_holes_nothing_is_held_out(rng):
+    """Half floats round: what they round by is no hole."""
+    things, ground = rng.uniform(size=SIZE), rng.uniform(0.5, 1, size=SIZE)
+    whole = things + (1 - things) * ground
+    kept = (part.astype(np.float16).astype(np.float32) for part in (whole, ground, things))
+    assert not held_out(*kept).any()

@@ -107,3 +107,13 @@ def test_a_coarser_map_has_the_same_light(noisy) -> None:
     coarse = fine.coarser(4)
     assert coarse.image.shape == (16, 32, 3)
     np.testing.assert_allclose(coarse.irradiance(), fine.irradiance(), rtol=1e-5)
+
+
+def test_how_much_light_is_below_zero() -> None:
+    """A band of -1 around the horizon in a world of 1: by solid angle, half of a sphere is within
+    30 degrees of its equator."""
+    image = np.ones((180, 360, 3), np.float32)
+    assert Environment(image).below_zero == 0
+    assert Environment(0 * image).below_zero == 0
+    image[60:120] = -1
+    assert Environment(image).below_zero == pytest.approx(0.5)
