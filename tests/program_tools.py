@@ -45,6 +45,20 @@ if camera != "none":
     bpy.ops.render.render(write_still=True)
 """
 
+# The beginning of a script that saves a shot with a shadow catcher, small and quick.
+MAKE_CATCHER = """
+import bpy, sys
+bpy.ops.wm.read_factory_settings()
+bpy.ops.preferences.addon_enable(module="bl_ext.user_default.arto")
+scene = bpy.context.scene
+scene.render.engine = "CYCLES"
+scene.render.resolution_x, scene.render.resolution_y = 48, 36
+scene.render.resolution_percentage = 100
+scene.render.film_transparent = True
+bpy.ops.mesh.primitive_plane_add(size=20, location=(0, 0, -1))
+bpy.context.object.is_shadow_catcher = True
+"""
+
 
 class Program:
     """Blender with the extension installed, and its user's files in `home`."""

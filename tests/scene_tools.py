@@ -268,3 +268,24 @@ def differences(before: Any, after: Any, path: str = "") -> list[str]:
             d for key in keys for d in differences(before.get(key), after.get(key), f"{path}.{key}")
         ]
     return [] if before == after else [f"{path}: {before!s:.80} -> {after!s:.80}"]
+
+
+def holding_out(scene, how):
+    """Let the one box hold out, wholly or (`mixed`) half."""
+    matt = scene.objects["Matt"]
+    if how == "object":
+        matt.is_holdout = True
+    elif how == "collection":
+        held = bpy.data.collections.new("Held")
+        scene.collection.children.link(held)
+        scene.collection.objects.unlink(matt)
+        held.objects.link(matt)
+        scene.view_layers[0].layer_collection.children["Held"].holdout = True
+    else:
+        tree = matt.data.materials[0].node_tree
+        out = tree.get_output_node("CYCLES")
+        hole, mix = tree.nodes.new("ShaderNodeHoldout"), tree.nodes.new("ShaderNodeMixShader")
+        mix.inputs[0].default_value = 0.5 if how == "mixed" else 1.0
+        tree.links.new(tree.nodes["Principled BSDF"].outputs[0], mix.inputs[1])
+        tree.links.new(hole.outputs[0], mix.inputs[2])
+        tree.links.new(mix.outputs[0], out.inputs["Surface"])

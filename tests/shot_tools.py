@@ -120,3 +120,18 @@ def comp_by_cycles(scene, samples, seed, tmp_path, footage) -> np.ndarray:
 def bare_of(scene) -> np.ndarray:
     """Where nothing stands before the ground."""
     return Field(paths.field_folder(scene).parent / "things" / "field").layer("alpha") == 0
+
+
+def relit_layers(scene):
+    """The plate, and its layers by name."""
+    path, _ = work.run(relight.relight(scene))
+    found = exr.read(plate.layers_file(path))
+    np.testing.assert_array_equal(found.pop(""), exr.read(path)[""])
+    return exr.read(path)[""], found
+
+
+def group_at(scene, name, azimuth, elevation, radius):
+    group = scene.arto.groups.add()
+    group.name, group.azimuth, group.elevation = name, azimuth, elevation
+    group.radius = radius
+    return group

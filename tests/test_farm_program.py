@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from arto.core import exr
-from program_tools import Program, said
+from program_tools import MAKE_CATCHER, Program, said
 
 # One machine, with the tiles that the job has.
 ALONE = """
@@ -28,23 +28,15 @@ bpy.ops.arto.capture()
 QUIET = ("-b", "--factory-startup", "--offline-mode", "--addons", "bl_ext.user_default.arto")
 
 
-# A shot with a shadow catcher, small and quick.
-CATCHER = """
-import bpy, sys
-bpy.ops.wm.read_factory_settings()
-bpy.ops.preferences.addon_enable(module="bl_ext.user_default.arto")
-scene = bpy.context.scene
-scene.render.engine = "CYCLES"
-scene.render.resolution_x, scene.render.resolution_y = 48, 36
-scene.render.resolution_percentage = 100
-scene.render.film_transparent = True
+CATCHER = (
+    MAKE_CATCHER
+    + """
 scene.cycles.samples = 32
-bpy.ops.mesh.primitive_plane_add(size=20, location=(0, 0, -1))
-bpy.context.object.is_shadow_catcher = True
 scene.arto.quality, scene.arto.patches, scene.arto.adaptive = "DRAFT", 1, False
 scene.arto.denoise = False
 bpy.ops.wm.save_as_mainfile(filepath=sys.argv[-1])
 """
+)
 
 
 def arrays(folder: Path) -> dict[str, np.ndarray]:

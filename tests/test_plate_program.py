@@ -6,25 +6,18 @@ from pathlib import Path
 
 import numpy as np
 from arto.core import exr
-from program_tools import Program, said
+from program_tools import MAKE_CATCHER, Program, said
 
-SCENE = """
-import bpy, sys
-bpy.ops.wm.read_factory_settings()
-bpy.ops.preferences.addon_enable(module="bl_ext.user_default.arto")
-scene = bpy.context.scene
-scene.render.engine = "CYCLES"
-scene.render.resolution_x, scene.render.resolution_y = 48, 36
-scene.render.resolution_percentage = 100
-scene.render.film_transparent = True
-bpy.ops.mesh.primitive_plane_add(size=20, location=(0, 0, -1))
-bpy.context.object.is_shadow_catcher = True
+SCENE = (
+    MAKE_CATCHER
+    + """
 bpy.data.objects["Light"].lightgroup = "Key"
 scene.view_layers[0].lightgroups.add(name="Key")
 scene.arto.samples, scene.arto.patches, scene.arto.adaptive = 16, 1, False
 scene.arto.layers, scene.arto.denoise = "FACES", False
 bpy.ops.wm.save_as_mainfile(filepath=sys.argv[-1])
 """
+)
 MIXED = """
 import bpy, sys
 scene = bpy.context.scene

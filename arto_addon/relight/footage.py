@@ -56,7 +56,7 @@ class Footage:
         if not data == display == frame:
             return self._placed(scene, data, frame)
         width, height = picture_size(scene)
-        fine = self._finer(scene)
+        fine = _finer(_size(data), (width, height))
         found = self._composited(scene, (fine * width, fine * height), opaque=True)
         # a picture of another size fades out at its rim, and its alpha, which was 1, with it
         covered = found[..., 3:]
@@ -109,13 +109,6 @@ class Footage:
             f"the footage '{self.name}' is a file of layers, and none is a plain picture: write it "
             "with R, G, B at its root"
         )
-
-    def _finer(self, scene: bpy.types.Scene) -> int:
-        """How many times finer than the picture it is looked at: what is larger than the picture is
-        averaged, where Blender would take some of its pixels."""
-        data, _ = self._windows(scene)
-        sizes = zip(_size(data), picture_size(scene), strict=True)
-        return min(max(round(min(there / wanted for there, wanted in sizes)), 1), _FINEST)
 
     def _windows(self, scene: bpy.types.Scene) -> tuple[Box, Box]:
         """The pixels that there are, and those of its frame.
@@ -214,6 +207,13 @@ class Footage:
             return ""
         path = Path(bpy.path.abspath(image.filepath, library=image.library))
         return "" if path.exists() else str(path)
+
+
+def _finer(there: tuple[int, int], wanted: tuple[int, int]) -> int:
+    """How many times finer than the picture footage is looked at: what is larger than the picture
+    is averaged, where Blender would take some of its pixels. Both are widths and heights."""
+    times = min(has / needs for has, needs in zip(there, wanted, strict=True))
+    return min(max(round(times), 1), _FINEST)
 
 
 def _with_overscan(scene: bpy.types.Scene, frame: Box) -> Box:

@@ -9,7 +9,7 @@ from typing import Any
 import arto
 import bpy
 import pytest
-from scene_tools import captured, small_scene
+from scene_tools import captured, hdri, small_scene, smooth
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -47,3 +47,14 @@ def noise(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Any]
         return kept[route, seed]
 
     return get
+
+
+@pytest.fixture
+def lit(tmp_path):
+    scene = small_scene(tmp_path, lamp=True)
+    scene.render.film_transparent = True
+    scene.arto.samples, scene.arto.patches, scene.arto.keep = 32, 2, "never"
+    scene.arto.layers, scene.arto.layers_half = "FACES", False
+    hdri(scene, smooth())
+    captured(scene)
+    return scene

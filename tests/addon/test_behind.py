@@ -13,7 +13,7 @@ from arto.arto_addon.relight import relight
 from arto.arto_addon.stage.stage import picture_region, stage
 from arto.arto_addon.world.background import background
 from arto.core import exr
-from scene_tools import hdri, small_scene, smooth
+from scene_tools import hdri, holding_out, small_scene, smooth
 from shot_tools import run_all
 
 
@@ -48,23 +48,12 @@ def test_plate_over_its_world(tmp_path, how):
     """With a film that is opaque: holes are black and transparent, outside a region is nothing, and
     all else is as near to Cycles as two of its seeds."""
     scene = sky(tmp_path)
-    matt = scene.objects["Matt"]
-    if how == "object":
-        matt.is_holdout = True
-    elif how == "collection":
-        held = bpy.data.collections.new("Held")
-        scene.collection.children.link(held)
-        scene.collection.objects.unlink(matt)
-        held.objects.link(matt)
-        scene.view_layers[0].layer_collection.children["Held"].holdout = True
-    elif how == "shader":
-        tree = matt.data.materials[0].node_tree
-        hole = tree.nodes.new("ShaderNodeHoldout")
-        tree.links.new(hole.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
-    elif how == "region":
+    if how == "region":
         scene.render.use_border = True
         scene.render.border_min_x, scene.render.border_max_x = 0.25, 0.75
         scene.render.border_min_y, scene.render.border_max_y = 0.5, 1.0
+    elif how != "plain":
+        holding_out(scene, how)
     picture = run_all(scene)
     one, two = (own_picture(scene, 256, tmp_path, seed) for seed in (1, 2))
     assert picture.shape == one.shape

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import bpy
 import numpy as np
 import pytest
 from arto.arto_addon.relight import relight
@@ -10,31 +9,10 @@ from arto.arto_addon.world import kept
 from arto.core import exr
 from arto.core.light import PatchLight
 from arto.core.preview import Preview
-from scene_tools import captured
+from scene_tools import captured, holding_out
 from shot_tools import comp_by_cycles, cycles_catcher, relit_and_share, with_catcher
 
 FOOTAGE = np.float32([0.3, 0.5, 0.8])
-
-
-def holding_out(scene, how):
-    """Let the one box hold out, wholly or (`mixed`) half."""
-    matt = scene.objects["Matt"]
-    if how == "object":
-        matt.is_holdout = True
-    elif how == "collection":
-        held = bpy.data.collections.new("Held")
-        scene.collection.children.link(held)
-        scene.collection.objects.unlink(matt)
-        held.objects.link(matt)
-        scene.view_layers[0].layer_collection.children["Held"].holdout = True
-    else:
-        tree = matt.data.materials[0].node_tree
-        out = tree.get_output_node("CYCLES")
-        hole, mix = tree.nodes.new("ShaderNodeHoldout"), tree.nodes.new("ShaderNodeMixShader")
-        mix.inputs[0].default_value = 0.5 if how == "mixed" else 1.0
-        tree.links.new(tree.nodes["Principled BSDF"].outputs[0], mix.inputs[1])
-        tree.links.new(hole.outputs[0], mix.inputs[2])
-        tree.links.new(mix.outputs[0], out.inputs["Surface"])
 
 
 @pytest.mark.parametrize("how", ["object", "collection", "shader", "mixed"])

@@ -6,19 +6,15 @@ import math
 
 import bpy
 import numpy as np
-import OpenImageIO
 import pytest
 from arto.arto_addon import work
 from arto.arto_addon.blender.compositing import add_output, compositor, new_compositor
 from arto.arto_addon.blender.nodes import new_world
-from arto.arto_addon.blender.output import set_format
-from arto.arto_addon.blender.version import FIVE
 from arto.arto_addon.relight import plate, relight
 from arto.arto_addon.relight.back import mix_to_scene
-from arto.arto_addon.relight.many import relight_many
 from arto.arto_addon.shot import paths
-from arto.core import cryptomatte, exr
-from arto.core.errors import ExrError, SceneError
+from arto.core import exr
+from arto.core.errors import SceneError
 from arto.core.field import Field
 from scene_tools import (
     assert_as_cycles,
@@ -29,36 +25,11 @@ from scene_tools import (
     small_scene,
     smooth,
 )
-
-
-@pytest.fixture
-def lit(tmp_path):
-    scene = small_scene(tmp_path, lamp=True)
-    scene.render.film_transparent = True
-    scene.arto.samples, scene.arto.patches, scene.arto.keep = 32, 2, "never"
-    scene.arto.layers, scene.arto.layers_half = "FACES", False
-    hdri(scene, smooth())
-    captured(scene)
-    return scene
-
-
-def relit(scene):
-    """The plate, and its layers by name."""
-    path, _ = work.run(relight.relight(scene))
-    found = exr.read(plate.layers_file(path))
-    np.testing.assert_array_equal(found.pop(""), exr.read(path)[""])
-    return exr.read(path)[""], found
-
-
-def group_at(scene, name, azimuth, elevation, radius):
-    group = scene.arto.groups.add()
-    group.name, group.azimuth, group.elevation = name, azimuth, elevation
-    group.radius = radius
-    return group
+from shot_tools import group_at, relit_layers
 
 
 def test_faces_and_the_scenes_own_lamps_sum_to_the_plate(lit):
-    picture, found = relit(lit)
+    picture, found = relit_layers(lit)
     assert set(found) == {
         f"LG_{f}" for f in ("top", "bottom", "left", "right", "back", "front")
     } | {"LG_own"}
@@ -73,7 +44,7 @@ def test_a_layer_is_the_picture_in_that_part_of_the_light(lit):
     lit.arto.layers = "GROUPS"
     group_at(lit, "key", 2.0, 0.6, 0.8)
     lit.arto.own_lamps = 0.0
-    _, found = relit(lit)
+    _, found = relit_layers(lit)
     image = smooth()
     height, width = image.shape[:2]
     u, v = (np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height
@@ -107,7 +78,7 @@ def test_a_group_that_is_painted_on_the_hdri(lit):
     lit.arto.groups[0].mask = white
     lit.world = new_world("Sky")
     hdri(lit, image, rotation=0.9)
-    picture, found = relit(lit)
+    picture, found = relit_layers(lit)
     np.testing.assert_allclose(sum(found.values()), picture[..., :3], rtol=1e-5, atol=1e-6)
     lit.world = new_world("Painted")
     hdri(lit, image * mask[..., None], rotation=0.9)
@@ -120,7 +91,7 @@ def test_a_group_that_is_painted_on_the_hdri(lit):
     lit.world = new_world("Plain")
     lit.arto.layers = "GROUPS"
     with pytest.raises(SceneError, match="painted"):
-        relit(lit)
+        relit_layers(lit)
 
 
 def test_groups_need_names_of_their_own(lit):
@@ -128,18 +99,18 @@ def test_groups_need_names_of_their_own(lit):
     group_at(lit, "key.1", 0, 0.5, 0.3)
     group_at(lit, "key_1", 1, 0.5, 0.3)
     with pytest.raises(SceneError, match="rename"):
-        relit(lit)
+        relit_layers(lit)
     lit.arto.groups[1].name = "rest"
     with pytest.raises(SceneError, match="rename"):
-        relit(lit)
+        relit_layers(lit)
     lit.arto.groups[1].name = "12"
-    _, found = relit(lit)
+    _, found = relit_layers(lit)
     assert "LG_layer_12" in found and not any(n.removeprefix("LG_").isdigit() for n in found)
 
 
 def test_denoised_layers_sum_to_the_denoised_plate(lit):
     lit.arto.denoise = True
-    picture, found = relit(lit)
+    picture, found = relit_layers(lit)
     np.testing.assert_allclose(sum(found.values()), picture[..., :3], rtol=1e-5, atol=1e-6)
 
 
@@ -152,55 +123,22 @@ def test_a_sun_is_in_the_group_that_has_it(lit):
     lit.arto.layers = "GROUPS"
     u, v = 41.5 / image.shape[1], 11.5 / image.shape[0]
     group_at(lit, "sun", (0.5 - u) * 2 * math.pi, (0.5 - v) * math.pi, 0.3)
-    picture, found = relit(lit)
+    picture, found = relit_layers(lit)
     np.testing.assert_allclose(sum(found.values()), picture[..., :3], rtol=1e-5, atol=1e-6)
     assert found["LG_sun"].mean() > 0.5 * picture[..., :3].mean()
 
 
 def test_the_world_behind_is_a_layer(lit):
     lit.render.film_transparent = False
-    picture, found = relit(lit)
+    picture, found = relit_layers(lit)
     np.testing.assert_allclose(sum(found.values()), picture[..., :3], rtol=1e-5, atol=1e-6)
     clear = found["LG_behind"].sum(axis=-1) > 0
     assert 0.05 < clear.mean() < 0.95
 
 
-def test_a_reader_that_knows_nothing_of_arto(lit):
-    """OpenImageIO finds one part of half floats, plain R, G, B, A first, and what the layers of
-    each channel add up to; the data as parts of their own."""
-    lit.arto.layers_half, lit.arto.layer_prefix, lit.arto.write_data = True, "C_", True
-    path, _ = work.run(relight.relight(lit))
-    file = OpenImageIO.ImageInput.open(str(plate.layers_file(path)))
-    spec = file.spec()
-    assert spec.channelnames[:4] == ("R", "G", "B", "A") and spec.format == "half"
-    assert {"C_top.R", "C_own.B"} <= set(spec.channelnames)
-    assert (
-        spec["colorInteropID"] == "lin_rec709_scene" and spec.getattribute("chromaticities") is None
-    )
-    assert spec["compression"] == "zip"
-    pixels = file.read_image("float")
-    for i, c in enumerate("RGB"):
-        mine = [n for n, name in enumerate(spec.channelnames) if name.endswith(f".{c}")]
-        whole = pixels[..., i]
-        assert np.abs(pixels[..., mine].sum(axis=-1) - whole).max() < 2e-3 * whole.max()
-    assert not file.seek_subimage(1, 0)
-    data = OpenImageIO.ImageInput.open(str(plate.data_file(path)))
-    found = {}
-    while data.seek_subimage(len(found), 0):
-        spec = data.spec()
-        found[spec["oiio:subimagename"]] = spec.channelnames
-        assert spec.format == "float" and spec["colorInteropID"] == "data"
-    assert found == {
-        "albedo": ("R", "G", "B"),
-        "normal": ("X", "Y", "Z"),
-        "depth": ("Z",),
-        "position": ("X", "Y", "Z"),
-    }
-
-
 def test_the_mixer_in_the_compositor(lit, tmp_path):
     """With every gain at one it gives the plate; a gain dims its layer alone, a tint colours it."""
-    picture, found = relit(lit)
+    picture, found = relit_layers(lit)
     group = bpy.data.node_groups["ARTO Relit Mix"]
     node = in_compositor(lit, group, "Image")
     np.testing.assert_allclose(composited(lit, tmp_path), picture, rtol=1e-4, atol=1e-5)
@@ -211,12 +149,12 @@ def test_the_mixer_in_the_compositor(lit, tmp_path):
     np.testing.assert_allclose(composited(lit, tmp_path)[..., :3], 2 * mixed, rtol=1e-4, atol=1e-5)
     # kept: another relight puts new pixels into the same nodes and sockets
     nodes = len(group.nodes)
-    relit(lit)
+    relit_layers(lit)
     assert len(group.nodes) == nodes and node.inputs["LG_top"].default_value == 0.25
     # a layer that was not there is added; one that is gone is black
     lit.arto.layers = "GROUPS"
     group_at(lit, "key", 2.0, 0.6, 0.8)
-    picture, _ = relit(lit)
+    picture, _ = relit_layers(lit)
     assert "LG_key" in node.inputs and "LG_top" in node.inputs
     for name in ("LG_own Tint",):
         node.inputs[name].default_value = (1, 1, 1, 1)
@@ -242,7 +180,7 @@ def test_own_lamps_by_their_light_group(tmp_path, patches):
             scene.view_layers[0].lightgroups.add(name=name)
     captured(scene)
     scene.arto.layers, scene.arto.layers_half = "FACES", False
-    picture, found = relit(scene)
+    picture, found = relit_layers(scene)
     assert {"LG_own_Key_Light", "LG_own_fill", "LG_own"} <= set(found)
     np.testing.assert_allclose(sum(found.values()), picture[..., :3], rtol=1e-5, atol=1e-6)
     for name, lamp in lamps.items():
@@ -263,7 +201,7 @@ def test_layers_of_a_shot_with_catchers_sum_to_its_things(tmp_path):
     scene.arto.layers, scene.arto.layers_half = "FACES", False
     hdri(scene, smooth())
     captured(scene)
-    picture, found = relit(scene)
+    picture, found = relit_layers(scene)
     np.testing.assert_allclose(sum(found.values()), picture[..., :3], rtol=1e-5, atol=1e-6)
     assert plate.share_file(paths.relit_file(scene)).is_file()
 
@@ -287,7 +225,7 @@ def test_a_mix_goes_back_to_the_scene(tmp_path):
     scene.view_layers[0].lightgroups.add(name="Rim")
     hdri(scene, smooth(), rotation=0.4)
     captured(scene)
-    _, found = relit(scene)
+    _, found = relit_layers(scene)
     node = next(n for n in compositor(scene).nodes if "LG_key" in n.inputs)
     gains = {"key": (3.0, (1, 0.5, 0.25)), "rest": (0.2, (1, 1, 1)), "own_Rim": (2.0, (0, 1, 0))}
     mixed = sum(found.values())
@@ -312,57 +250,6 @@ def test_a_mix_goes_back_to_the_scene(tmp_path):
         mix_to_scene(scene)
 
 
-@pytest.mark.parametrize("window", ["FULL", "CROP"])
-def test_a_file_for_each_layer(lit, tmp_path, window):
-    """Another reader finds bare R, G, B, A, which add up to the plate; the mixer goes on."""
-    _, expected = relit(lit)
-    path = paths.relit_file(lit)
-    plate.layers_file(path).unlink()
-    lit.arto.layers_files, lit.arto.data_window = "EACH", window
-    work.run(relight.relight(lit))
-    picture = exr.read(path)[""]
-    total = 0
-    for name, layer in expected.items():
-        file = path.with_name(f"{path.stem}_{name}.exr")
-        image = OpenImageIO.ImageBuf(str(file))
-        assert image.spec().channelnames == ("R", "G", "B", "A")
-        assert image.spec()["arto.layer"] == name
-        pixels = image.get_pixels("float", OpenImageIO.get_roi_full(image.spec()))
-        np.testing.assert_allclose(pixels[..., :3], layer, rtol=1e-5, atol=1e-6)
-        np.testing.assert_array_equal(pixels[..., 3], picture[..., 3])
-        total = total + pixels[..., :3]
-    np.testing.assert_allclose(total, picture[..., :3], rtol=1e-5, atol=1e-6)
-    assert plate.layers_file(path).is_file() == (window == "FULL")
-    node = in_compositor(lit, bpy.data.node_groups["ARTO Relit Mix"], "Image")
-    node.inputs["LG_top"].default_value = 0.25
-    mixed = picture[..., :3] - 0.75 * expected["LG_top"]
-    np.testing.assert_allclose(composited(lit, tmp_path)[..., :3], mixed, rtol=1e-4, atol=1e-5)
-    # many pictures are shown by no mixer, and have no file for it
-    made = work.run(relight_many(lit, lit.view_layers[0].name, turns=2))
-    for each in made:
-        assert each.with_name(f"{each.stem}_LG_top.exr").is_file()
-        assert not plate.layers_file(each).exists()
-        assert not plate.full_file(plate.layers_file(each)).exists()
-
-
-def test_a_mix_of_single_files_goes_back_to_the_scene(lit):
-    lit.arto.layers_files, lit.arto.data_window = "EACH", "CROP"
-    work.run(relight.relight(lit))
-    assert mix_to_scene(lit) == plate.world_file(paths.relit_file(lit))
-
-
-def test_a_layers_file_is_no_other_file(lit):
-    """Not one of ARTO's, and not one that a disk takes for the same."""
-    lit.arto.layers, lit.arto.layers_files, lit.arto.layer_prefix = "GROUPS", "EACH", ""
-    group_at(lit, "Data", 0, 0.5, 0.3)
-    with pytest.raises(SceneError, match=r"'Data' would be written over .*_Data\.exr"):
-        work.run(relight.relight(lit))
-    lit.arto.layer_prefix = "LG_"
-    group_at(lit, "data", 1, 0.5, 0.3)
-    with pytest.raises(SceneError, match="'LG_data' would be written over"):
-        work.run(relight.relight(lit))
-
-
 def relit_alpha(scene):
     return exr.read(paths.relit_file(scene))[""][..., 3:]
 
@@ -381,11 +268,11 @@ def test_instead_of_the_render_and_back(lit):
     def comes_from(node):
         return node.inputs["Image"].links[0].from_node
 
-    relit(lit)
+    relit_layers(lit)
     assert comes_from(blur) == render and comes_from(glare) == render
     lit.arto.use_in_compositor = "RENDER"
     assert comes_from(blur).node_tree.name == "ARTO Relit Mix" == comes_from(glare).node_tree.name
-    relit(lit)
+    relit_layers(lit)
     assert comes_from(blur).node_tree.name == "ARTO Relit Mix"
     lit.arto.layers = "OFF"
     work.run(relight.relight(lit))
@@ -397,55 +284,12 @@ def test_instead_of_the_render_and_back(lit):
     assert comes_from(out.inputs[0].links[0].from_node) == render
 
 
-@pytest.mark.parametrize("interleaved", [True, False] if FIVE else [None])
-def test_cryptomattes_are_handed_on(lit, tmp_path, interleaved):
-    """Every rank, bit for bit, and the names: from a file of the artist's own render."""
-    lit.view_layers[0].use_pass_cryptomatte_object = True
-    settings, rendered = lit.render.image_settings, tmp_path / "mine.exr"
-    set_format(settings, "MULTI_LAYER_IMAGE", "OPEN_EXR_MULTILAYER")
-    if interleaved is not None:
-        settings.use_exr_interleave = interleaved
-    lit.render.filepath, lit.cycles.samples = str(rendered), 4
-    bpy.ops.render.render(write_still=True)
-    lit.arto.write_data, lit.arto.cryptomatte = True, str(rendered)
-    path, _ = work.run(relight.relight(lit))
-    there, names = cryptomatte.read(plate.data_file(path))
-    mine, expected = cryptomatte.read(rendered)
-    assert names == expected and any("Glossy" in str(text) for text in names.values())
-    assert there.keys() == mine.keys() and len(mine) == 12
-    for name, plane in mine.items():
-        np.testing.assert_array_equal(there[name].view(np.int32), plane.view(np.int32))
-    lit.view_layers[0].use_pass_cryptomatte_object = False
-    bpy.ops.render.render(write_still=True)
-    with pytest.raises(ExrError, match="no Cryptomatte"):
-        relit(lit)
-    lit.arto.cryptomatte = str(tmp_path / "gone.exr")
-    with pytest.raises(ExrError, match="no file"):
-        relit(lit)
-
-
-@pytest.mark.parametrize("prefix", ["a.b", "..", "ü .x", "/x", "10"])
-def test_any_prefix_makes_names_that_programs_read(lit, tmp_path, prefix):
-    """A dot parts a layer from its channels: with one in a prefix the mixer found no layer. They
-    add up, and the mixer shows them."""
-    lit.arto.layer_prefix = prefix
-    picture, found = relit(lit)
-    assert len(found) == 7
-    assert not any(set(name) & set(". /") or name.isdigit() for name in found)
-    np.testing.assert_allclose(sum(found.values()), picture[..., :3], rtol=1e-5, atol=1e-6)
-    in_compositor(lit, bpy.data.node_groups["ARTO Relit Mix"], "Image")
-    np.testing.assert_allclose(composited(lit, tmp_path), picture, rtol=1e-4, atol=1e-5)
-    lit.arto.layers_files = "EACH"
-    path, _ = work.run(relight.relight(lit))
-    assert len(list(tmp_path.glob(exr.header(path)["arto.layers"]))) >= 7
-
-
 def test_a_group_is_not_called_as_a_socket_of_the_mixer(lit):
     """Without a prefix: the mixer would have taken its own socket for the layer's."""
     lit.arto.layers, lit.arto.layer_prefix = "GROUPS", ""
     group_at(lit, "Exposure", 0, 0.5, 0.3)
     with pytest.raises(SceneError, match="rename"):
-        relit(lit)
+        relit_layers(lit)
     lit.arto.layer_prefix = "LG_"
-    _, found = relit(lit)
+    _, found = relit_layers(lit)
     assert "LG_Exposure" in found
