@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ...core import exr
 from ...core.errors import SceneError
-from ...core.exr_window import Box
+from ...core.exr.window import Box
 from ..blender.compositing import choose, compositor, studio, turned_off
 from ..blender.pictures import put
 from ..stage.stage import picture_size

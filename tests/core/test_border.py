@@ -45,7 +45,7 @@ def test_the_walk_sees_imports_of_every_kind(tmp_path: Path) -> None:
 @pytest.mark.parametrize("module", MODULES, ids=lambda m: str(m.relative_to(CORE)))
 def test_core_module_is_free_of_blender_and_small(module: Path) -> None:
     assert not imported(module) & (BLENDER | {"arto_addon"})
-    assert ("OpenEXR" in imported(module)) == (module.name == "exr.py")
+    assert ("OpenEXR" in imported(module)) == (module.name == "file.py")
     assert len(module.read_text().splitlines()) < 400
 
 

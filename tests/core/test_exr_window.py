@@ -10,7 +10,7 @@ import OpenImageIO
 import pytest
 from arto.core import exr
 from arto.core.errors import ExrError
-from arto.core.exr_window import Window
+from arto.core.exr.window import Window
 
 SIZE = (23, 37)
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import ExrError
+from ..errors import ExrError
 
 # An attribute of ours: the box of all of the picture, which overscan puts beyond the display window
 # and a crop beyond the data window.

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .exr_window import PICTURE
+from .window import PICTURE
 
 # No name in a header is longer, and no picture larger.
 _LONGEST_TEXT = 256

@@ -1,7 +1,7 @@
 """The one door to EXR files. Rows run top-down, as in the file; data is float32 unless it was half.
 
 What is read is the whole picture: all of the display window, and what there is beyond it, with 0
-where the file has no pixels (`exr_window`).
+where the file has no pixels (`window`).
 
 Blender carries an OpenEXR of its own whose symbols the wheel's library would otherwise find first:
 compressed reads then report errors for good pixels. The extension's wheels are changed so that
@@ -20,12 +20,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import ExrError
-from .exr_layout import LayoutError, PlainPart, forget
-from .exr_layout import check as check_layout
-from .exr_layout import plain as plain_parts
-from .exr_window import FULL, Box, Window, box_of, place
-from .files import whole
+from ..errors import ExrError
+from ..files import whole
+from .layout import LayoutError, PlainPart, forget
+from .layout import check as check_layout
+from .layout import plain as plain_parts
+from .window import FULL, Box, Window, box_of, place
 
 _ORDER = "RGBAXYZ"  # of channels in an array; others follow
 # How many channels a message names.
@@ -73,7 +73,7 @@ def _decoded(path: Path) -> tuple[list[dict[str, Any]], list[dict[str, NDArray]]
 
 
 def _check_complete(path: Path) -> int:
-    """How many parts the file has; ExrError unless all of it is there (`exr_layout`)."""
+    """How many parts the file has; ExrError unless all of it is there (`layout`)."""
     with _opened(path) as data, _telling(path):
         return check_layout(data)
 
