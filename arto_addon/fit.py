@@ -6,7 +6,7 @@ from pathlib import Path
 
 import bpy
 
-from ..core.capture_set import CaptureSet
+from ..core.capture.capture_set import CaptureSet
 from ..core.errors import CaptureSetError, FieldError
 from ..core.field import Field
 from ..core.files import Lock

@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 from arto.arto_addon.shot import paths
 from arto.core import exr, metrics
-from arto.core.capture_set import CaptureSet
+from arto.core.capture.capture_set import CaptureSet
 from arto.core.field import Field
 
 from . import pictures, reference, scenes

@@ -19,7 +19,7 @@ from arto.arto_addon.blender.output import float_exr, write_to
 from arto.arto_addon.capture import capture
 from arto.arto_addon.relight import relight
 from arto.core import exr, metrics
-from arto.core.capture_set import CaptureSet
+from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import ArtoError
 
 from . import reference, worlds

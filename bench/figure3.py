@@ -6,7 +6,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
-from arto.core.moments import Moments
+from arto.core.capture.moments import Moments
 from arto.core.supports import BOX
 
 from . import scenes

@@ -15,7 +15,7 @@ from arto.arto_addon import work
 from arto.arto_addon.capture import capture
 from arto.arto_addon.world.bake import bake
 from arto.core import matte, metrics
-from arto.core.capture_set import CaptureSet
+from arto.core.capture.capture_set import CaptureSet
 from arto.core.choice import CHOICES
 from arto.core.field import Field
 from arto.core.fit import fit

@@ -24,7 +24,7 @@ from arto.arto_addon.blender.output import float_exr, write_to
 from arto.arto_addon.capture import capture
 from arto.arto_addon.relight import relight
 from arto.core import exr
-from arto.core.agreement import agreement
+from arto.core.capture.agreement import agreement
 from arto.core.errors import ArtoError
 
 from . import reference

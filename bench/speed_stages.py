@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 from arto.core import fit
-from arto.core.basis_images import Around
-from arto.core.capture_set import CaptureSet
+from arto.core.capture.basis_images import Around
+from arto.core.capture.capture_set import CaptureSet
 from arto.core.environment import Environment
 from arto.core.field import Field
 from arto.core.field_writer import FieldWriter

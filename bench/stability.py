@@ -11,10 +11,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from arto.core.capture.moments import Moments
 from arto.core.environment import Environment
 from arto.core.hemicube import Hemicube
 from arto.core.light import PatchLight
-from arto.core.moments import Moments
 from arto.core.patterns import PATTERN_SETS, PatternSet, monomials
 from arto.core.search import search
 from arto.core.supports import BOX, SUPPORTS

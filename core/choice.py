@@ -22,10 +22,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .capture.moments import Moments
 from .errors import FieldError
 from .evidence import Evidence
 from .measure import Extent
-from .moments import Moments
 from .patterns import ONE, UU, VV, PatternSet, U, V
 from .supports import BOX, LINEAR, NOTHING, PER_CHANNEL, SUPPORTS, WHOLE, Support
 

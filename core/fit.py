@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import choice as choices
-from .basis_images import BasisImages, TileData
-from .capture_set import CaptureSet
+from .capture.basis_images import BasisImages, TileData
+from .capture.capture_set import CaptureSet
+from .capture.moments import Moments
 from .evidence import evidence
 from .field_writer import FieldWriter, write_tile
 from .hemicube import Hemicube
-from .moments import Moments
 from .patterns import PatternSet
 from .search import search
 from .supports import BOX, NOTHING, WHOLE

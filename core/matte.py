@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .capture.moments import Moments
 from .hemicube import Hemicube
 from .light import PatchLight, bin_coordinate
-from .moments import Moments
 from .patterns import PatternSet
 
 # Directions that a cap is averaged over.

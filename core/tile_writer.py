@@ -8,7 +8,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from .basis_images import OF_ONE_RAY
+from .capture.basis_images import OF_ONE_RAY
 from .errors import FieldError
 from .field_tile import FULL, LARGEST, blocks_of, steps_of
 from .files import whole

@@ -15,7 +15,7 @@ from arto.arto_addon.blender.compositing import add_output, new_compositor
 from arto.arto_addon.blender.nodes import new_material, new_world
 from arto.arto_addon.capture import capture as capture_module
 from arto.arto_addon.shot import scene_id
-from arto.core.capture_set import CaptureSet
+from arto.core.capture.capture_set import CaptureSet
 
 WIDTH, HEIGHT = 24, 18
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import bpy
 
-from ...core.capture_set import VERSION, describe
+from ...core.capture.capture_set import VERSION, describe
 from ...core.errors import SceneError
 from ...core.hemicube import Hemicube
 from ...core.patterns import pattern_set

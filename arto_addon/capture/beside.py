@@ -7,7 +7,7 @@ import contextlib
 from pathlib import Path
 from typing import Any
 
-from ...core.capture_set import CaptureSet
+from ...core.capture.capture_set import CaptureSet
 from ...core.errors import ArtoError
 from ...core.hemicube import Hemicube
 from ..stage.takes import GROUND, THINGS

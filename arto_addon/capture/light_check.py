@@ -13,7 +13,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...core.agreement import DIFFERENT, SUSPECTED, Agreement, agreement
+from ...core.capture.agreement import DIFFERENT, SUSPECTED, Agreement, agreement
 from ...core.environment import Environment, directions, sample_directions
 from ...core.hemicube import Hemicube
 from ...core.patterns import pattern_set

@@ -9,12 +9,12 @@ from typing import Any
 
 import bpy
 
-from ...core.basis_images import GRAIN
+from ...core.capture.basis_images import GRAIN
+from ...core.capture.refine import check as can_refine
 from ...core.choice import check as check_choice
 from ...core.errors import ArtoError
 from ...core.hemicube import Hemicube
 from ...core.patterns import pattern_set
-from ...core.refine import check as can_refine
 from ...core.region import Region
 from ..stage.settings import samples_of
 from ..stage.stage import Stage, picture_region

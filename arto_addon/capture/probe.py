@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core.basis_images import GROUP
+from ...core.capture.basis_images import GROUP
+from ...core.capture.refine import check, refine
 from ...core.errors import CaptureSetError
 from ...core.hemicube import FINEST, Hemicube
 from ...core.patterns import pattern_set
-from ...core.refine import check, refine
 from ..stage.small import parts_of, small
 from ..stage.stage import Stage
 from ..work import Steps

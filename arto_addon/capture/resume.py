@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from ...core.capture_set import HEADER, CaptureSet, write_header
+from ...core.capture.capture_set import HEADER, CaptureSet, write_header
 from ...core.errors import ArtoError, CaptureSetError, FieldError
 from ...core.field import Field
 from ...core.field_writer import describe, write_head

@@ -14,10 +14,10 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ...core.capture.refine import check as can_refine
+from ...core.capture.refine import refine
 from ...core.errors import SceneError
 from ...core.patterns import pattern_set
-from ...core.refine import check as can_refine
-from ...core.refine import refine
 from ..stage.bounds import rendered
 from ..stage.settings import prepare
 from ..stage.stage import stage

@@ -11,7 +11,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from ...core.capture_set import CaptureSet
+from ...core.capture.capture_set import CaptureSet
 from ...core.errors import CancelledError
 from ...core.fit import fit_into
 

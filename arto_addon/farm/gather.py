@@ -8,7 +8,7 @@ from typing import Any
 
 import bpy
 
-from ...core.capture_set import CaptureSet, write_header
+from ...core.capture.capture_set import CaptureSet, write_header
 from ...core.errors import ArtoError, FarmError
 from ...core.field import proxy_folder
 from ...core.files import PART, Lock

@@ -17,7 +17,7 @@ from typing import Any
 
 import bpy
 
-from ...core.capture_set import CaptureSet
+from ...core.capture.capture_set import CaptureSet
 from ...core.description import Description
 from ...core.errors import FarmError
 from ...core.files import write_text

@@ -14,7 +14,7 @@ from typing import Any
 
 import bpy
 
-from ...core.capture_set import CaptureSet
+from ...core.capture.capture_set import CaptureSet
 from ...core.errors import FarmError
 from ...core.files import PART, replace_folder, write_text
 from ...core.fit import fit_into

@@ -10,7 +10,7 @@ from typing import Any
 
 import bpy
 
-from ...core.capture_set import write_header
+from ...core.capture.capture_set import write_header
 from ...core.choice import check as check_choice
 from ...core.errors import FarmError
 from ...core.patterns import pattern_set

@@ -8,8 +8,9 @@ from typing import Any
 
 import bpy
 
-from ...core import capture_set, field
-from ...core.capture_set import CaptureSet
+from ...core import field
+from ...core.capture import capture_set
+from ...core.capture.capture_set import CaptureSet
 from ...core.errors import ArtoError
 from ...core.field import Field
 from ...core.shot import Shot

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import bpy
 
-from ...core import capture_set, field
+from ...core import field
+from ...core.capture import capture_set
 from ...core.errors import ArtoError
 from ...core.shot import Shot
 from ..capture.planned import most

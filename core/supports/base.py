@@ -7,8 +7,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..capture.moments import Moments
 from ..light import PatchLight
-from ..moments import Moments
 
 
 class Support(Protocol):

@@ -17,9 +17,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..capture.moments import Moments
 from ..light import PatchLight
 from ..measure import box_averages, box_of
-from ..moments import Moments
 from ..patterns import ONE, UU, UV, VV, U, V
 
 # Rounds of finding the box and taking its covariance from what the shares are told by.

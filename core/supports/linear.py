@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..capture.moments import Moments
 from ..light import PatchLight
-from ..moments import Moments
 from ..patterns import ONE, U, V
 
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..capture.moments import Moments
 from ..light import PatchLight
-from ..moments import Moments
 from .base import Support
 
 # Codes of per-channel models are those of the shared ones plus this.

@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..capture.moments import Moments
 from ..light import PatchLight
-from ..moments import Moments
 from ..patterns import ONE, UU, UV, VV, U, V
 
 # The grid: places and weights along each axis, in standard deviations. Each keeps variance 1

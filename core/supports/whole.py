@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..capture.moments import Moments
 from ..light import PatchLight
-from ..moments import Moments
 
 
 class Whole:

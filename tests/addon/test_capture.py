@@ -14,7 +14,7 @@ from arto.arto_addon.capture import capture, planned
 from arto.arto_addon.shot import status
 from arto.arto_addon.stage.stage import picture_region
 from arto.core import exr
-from arto.core.basis_images import GROUP
+from arto.core.capture.basis_images import GROUP
 from arto.core.errors import ArtoError, CancelledError, CaptureSetError, SceneError
 from scene_tools import (
     HEIGHT,

@@ -12,7 +12,7 @@ from arto.arto_addon.capture.beside import TAKES
 from arto.arto_addon.relight import plate, relight
 from arto.arto_addon.shot import paths
 from arto.core import exr
-from arto.core.capture_set import CaptureSet
+from arto.core.capture.capture_set import CaptureSet
 from arto.core.catcher import catch
 from arto.core.environment import Environment
 from arto.core.field import Field

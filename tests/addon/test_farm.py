@@ -19,7 +19,7 @@ from arto.arto_addon.farm import part as parts
 from arto.arto_addon.farm import templates
 from arto.arto_addon.farm.gather import gather
 from arto.arto_addon.shot import paths
-from arto.core.capture_set import CaptureSet
+from arto.core.capture.capture_set import CaptureSet
 from arto.core.environment import Environment
 from arto.core.errors import ArtoError, FarmError
 from arto.core.field import Field

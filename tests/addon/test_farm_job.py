@@ -17,7 +17,7 @@ from arto.arto_addon.farm.gather import gather
 from arto.arto_addon.relight.relight import relight
 from arto.arto_addon.shot import paths
 from arto.arto_addon.ui import properties
-from arto.core.capture_set import CaptureSet
+from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import FarmError, SceneError
 from arto.core.field import Field
 from scene_tools import captured

@@ -10,7 +10,7 @@ from arto.arto_addon import fit, work
 from arto.arto_addon.capture import capture, planned, room
 from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import paths
-from arto.core.capture_set import CaptureSet
+from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import CaptureSetError, PatternError, SceneError
 from arto.core.field import Field
 from scene_tools import small_scene

@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from arto.core import basis_images, capture_set, exr, fit
+from arto.core import exr, fit
+from arto.core.capture import basis_images, capture_set
 from arto.core.environment import Environment
 from arto.core.field import Field
 from arto.core.hemicube import Hemicube

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
-from arto.core import basis_images, capture_set, exr
-from arto.core.capture_set import HEADER, CaptureSet
+from arto.core import exr
+from arto.core.capture import basis_images, capture_set
+from arto.core.capture.capture_set import HEADER, CaptureSet
 from arto.core.errors import CaptureSetError
 from arto.core.hemicube import Hemicube
 from arto.core.patterns import PATTERN_SETS, pattern_set

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arto.core.capture_set import CaptureSet
+from arto.core.capture.capture_set import CaptureSet
 from arto.core.choice import BROAD, CHOICES, check, choose
 from arto.core.errors import FieldError, PatternError
 from arto.core.evidence import DROPPED, SUN, Evidence, evidence

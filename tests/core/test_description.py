@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from arto.core import capture_set, fit
-from arto.core.capture_set import CaptureSet
+from arto.core import fit
+from arto.core.capture import capture_set
+from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import ArtoError
 from arto.core.field import Field
 from arto.core.hemicube import Hemicube

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from arto.core import fit
-from arto.core.capture_set import CaptureSet
+from arto.core.capture.capture_set import CaptureSet
 from arto.core.environment import Environment
 from arto.core.errors import FieldError
 from arto.core.evidence import DROPPED
@@ -180,7 +180,7 @@ def test_opening_reads_no_arrays(tmp_path: Path, capture: Path, fitted, monkeypa
 
 
 def test_about_says_what_made_it(tmp_path: Path, scene) -> None:
-    from arto.core import capture_set
+    from arto.core.capture import capture_set
 
     made = scene(CUBE)
     capture_set.write(tmp_path / "c", CUBE, made.patterns, made.basis, scene="Shot 10", samples=8)

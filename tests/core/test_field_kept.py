@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from arto.core import fit
-from arto.core.capture_set import CaptureSet
+from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import CaptureSetError, FieldError, PatternError
 from arto.core.field import Field
 from arto.core.hemicube import Hemicube

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from arto.core.capture.moments import Moments
 from arto.core.hemicube import Hemicube
-from arto.core.moments import Moments
 from arto.core.patterns import UU, VV, U, V, pattern_set
 from arto.core.supports import BOX, LINEAR
 from hypothesis import given

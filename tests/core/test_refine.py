@@ -6,9 +6,9 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from arto.core.capture.refine import refine
 from arto.core.errors import HemicubeError
 from arto.core.hemicube import FACE_NAMES, FINEST, Hemicube
-from arto.core.refine import refine
 
 CUBE = Hemicube(patches=4)
 SHAPE = (6, 8)

@@ -15,12 +15,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from . import exr
-from .errors import CaptureSetError, ExrError
-from .hemicube import Hemicube
-from .patterns import PatternSet
-from .region import Region
-from .shot import safe_name
+from .. import exr
+from ..errors import CaptureSetError, ExrError
+from ..hemicube import Hemicube
+from ..patterns import PatternSet
+from ..region import Region
+from ..shot import safe_name
 
 # After ARTO there may be a number, where a light group of the artist's has the name without.
 GROUP = re.compile(r"(?:^|\.)Combined_ARTO(?:-\d+)?_(\d{4})_(\w+)$")

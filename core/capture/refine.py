@@ -18,8 +18,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import HemicubeError
-from .hemicube import FINEST, LEAF_SIDES, Hemicube, Leaf
+from ..errors import HemicubeError
+from ..hemicube import FINEST, LEAF_SIDES, Hemicube, Leaf
 from .moments import channel_sum
 
 # Cells (5.6 degrees) over which light stays alike: its correlation falls to 1/e.

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import exr
+from .. import exr
+from ..description import Description
+from ..errors import CaptureSetError, HemicubeError, PatternError
+from ..files import write_text
+from ..hemicube import Hemicube
+from ..patterns import PatternSet, pattern_set
 from .basis_images import BasisImages, TileData, group_name
-from .description import Description
-from .errors import CaptureSetError, HemicubeError, PatternError
-from .files import write_text
-from .hemicube import Hemicube
-from .patterns import PatternSet, pattern_set
 
 VERSION = 1
 HEADER = "capture.json"

@@ -14,8 +14,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .measure import Extent, uniform_moments
-from .patterns import ONE, UU, UV, VV, PatternSet, U, V
+from ..measure import Extent, uniform_moments
+from ..patterns import ONE, UU, UV, VV, PatternSet, U, V
 
 
 @dataclass(frozen=True)
