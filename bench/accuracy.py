@@ -21,12 +21,13 @@ from arto.arto_addon import fit, work
 from arto.arto_addon.relight import denoise, relight
 from arto.arto_addon.shot import paths
 from arto.arto_addon.world.bake import bake
-from arto.core import exr, lamps, matte, metrics
+from arto.core import exr, matte, metrics
 from arto.core.choice import CHOICES
-from arto.core.environment import Environment
 from arto.core.field import Field
 from arto.core.files import whole, write_text
-from arto.core.light import PatchLight
+from arto.core.light import lamps
+from arto.core.light.environment import Environment
+from arto.core.light.light import PatchLight
 from arto.core.relight import relight as relight_field
 from numpy.typing import NDArray
 

@@ -9,7 +9,7 @@ import bpy
 from arto.arto_addon.blender.nodes import new_material
 from arto.arto_addon.world.bake import bake
 from arto.core import metrics
-from arto.core.light import PatchLight
+from arto.core.light.light import PatchLight
 from arto.core.relight import relight
 
 from . import scenes

@@ -19,7 +19,7 @@ from arto.core.capture.capture_set import CaptureSet
 from arto.core.choice import CHOICES
 from arto.core.field import Field
 from arto.core.fit import fit
-from arto.core.light import PatchLight
+from arto.core.light.light import PatchLight
 from arto.core.relight import relight
 from arto.core.supports import NOTHING, REST
 from numpy.typing import NDArray

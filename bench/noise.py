@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from arto.arto_addon.relight import denoise
 from arto.arto_addon.world.bake import bake
-from arto.core import lamps, metrics
-from arto.core.light import PatchLight
+from arto.core import metrics
+from arto.core.light import lamps
+from arto.core.light.light import PatchLight
 from arto.core.patterns import ONE, U, V
 from numpy.typing import NDArray
 

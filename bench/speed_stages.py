@@ -20,11 +20,11 @@ import numpy as np
 from arto.core import fit
 from arto.core.capture.basis_images import Around
 from arto.core.capture.capture_set import CaptureSet
-from arto.core.environment import Environment
 from arto.core.field import Field
 from arto.core.field_writer import FieldWriter
 from arto.core.hemicube import Hemicube
-from arto.core.light import PatchLight
+from arto.core.light.environment import Environment
+from arto.core.light.light import PatchLight
 from arto.core.patterns import PatternSet, pattern_set
 from arto.core.region import Region
 from arto.core.relight import relight

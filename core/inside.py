@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .environment import Environment
 from .errors import FieldError
 from .field import Field
 from .hemicube import Hemicube
-from .layers import part_of
-from .light import PatchLight
+from .light.environment import Environment
+from .light.layers import part_of
+from .light.light import PatchLight
 from .supports import BOX, LINEAR
 
 # Where the faces are in the unfolded hemicube, in faces from its left and top; each is seen from

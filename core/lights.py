@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .errors import FieldError
 from .field_tile import Model, Tile
-from .light import PatchLight
+from .light.light import PatchLight
 
 # Of the unpacked entries, bytes at a time: a few patches of a block.
 ROOM = 1 << 26

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .capture.moments import Moments
 from .hemicube import Hemicube
-from .light import PatchLight, bin_coordinate
+from .light.light import PatchLight, bin_coordinate
 from .patterns import PatternSet
 
 # Directions that a cap is averaged over.

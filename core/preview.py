@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .catcher import catch, held_out
 from .field import HEADER, Field, proxy_folder
 from .hemicube import Hemicube
-from .light import PatchLight
+from .light.light import PatchLight
 from .merged import merged
 from .proxy import FACTORS
 from .relight import relights

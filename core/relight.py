@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .field import Field
 from .field_tile import Model, Tile
-from .light import PatchLight
+from .light.light import PatchLight
 from .lights import ROOM, Lights
 from .region import Region
 

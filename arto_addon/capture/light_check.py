@@ -14,8 +14,8 @@ import bpy
 import numpy as np
 
 from ...core.capture.agreement import DIFFERENT, SUSPECTED, Agreement, agreement
-from ...core.environment import Environment, directions, sample_directions
 from ...core.hemicube import Hemicube
+from ...core.light.environment import Environment, directions, sample_directions
 from ...core.patterns import pattern_set
 from ..blender.nodes import shader_tree, trees
 from ..stage.small import parts_of, small

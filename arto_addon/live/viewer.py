@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.environment import Environment
 from ...core.errors import ArtoError
-from ...core.light import PatchLight
+from ...core.light.environment import Environment
+from ...core.light.light import PatchLight
 from ...core.preview import Preview
 
 # A picture for a moving hand takes no longer than this.

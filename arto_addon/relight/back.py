@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...core import exr
 from ...core.errors import SceneError
-from ...core.layers import part_of
+from ...core.light.layers import part_of
 from ...core.shot import safe_name
 from ..blender.colour import working_space
 from ..blender.compositing import compositor

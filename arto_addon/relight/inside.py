@@ -9,12 +9,12 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.environment import Environment
 from ...core.errors import FieldError
 from ...core.inside import drawn, parts_at, shares_at, unfolded
-from ...core.lamps import split
-from ...core.layers import by_faces, disc, part_of
-from ...core.light import PatchLight
+from ...core.light.environment import Environment
+from ...core.light.lamps import split
+from ...core.light.layers import by_faces, disc, part_of
+from ...core.light.light import PatchLight
 from ...core.relight import relight
 from ..shot.shot import layer_of
 from ..world import kept

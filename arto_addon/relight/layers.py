@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core import exr
-from ...core.environment import Environment
 from ...core.errors import SceneError
 from ...core.field import Field
-from ...core.layers import REST, by_faces, disc, part_of, residual, share_out, shares
-from ...core.light import PatchLight
+from ...core.light.environment import Environment
+from ...core.light.layers import REST, by_faces, disc, part_of, residual, share_out, shares
+from ...core.light.light import PatchLight
 from ...core.relight import relights, together
 from ...core.shot import safe_name
 from ..shot import paths

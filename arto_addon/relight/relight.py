@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.catcher import catch_seen, held_out, of_ground
-from ...core.environment import Environment
 from ...core.errors import FieldError
 from ...core.field import Field
-from ...core.lamps import Split, split
-from ...core.light import PatchLight
+from ...core.light.environment import Environment
+from ...core.light.lamps import Split, split
+from ...core.light.light import PatchLight
 from ...core.region import Region
 from ...core.relight import over, relights
 from ..capture import beside

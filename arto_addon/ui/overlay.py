@@ -13,10 +13,10 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from ...core.environment import Environment
 from ...core.errors import ArtoError
 from ...core.hemicube import Hemicube
-from ...core.light import PatchLight
+from ...core.light.environment import Environment
+from ...core.light.light import PatchLight
 from ..capture import planes
 from ..live import live
 from ..live.maps import Maps

@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.environment import Environment
+from ...core.light.environment import Environment
 from ...core.region import Region
 from ..blender.nodes import Nodes, new_material, shader_tree, trees
 from ..stage.stage import set_region

@@ -16,9 +16,9 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...core.environment import Environment
 from ...core.errors import SceneError
 from ...core.files import whole
+from ...core.light.environment import Environment
 from ..blender.colour import working_space
 from ..blender.nodes import shader_tree, trees
 from ..shot import paths

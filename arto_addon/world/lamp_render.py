@@ -15,9 +15,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.environment import Environment
 from ...core.errors import SceneError
 from ...core.field import Field
+from ...core.light.environment import Environment
 from ...core.region import Region
 from ..blender.colour import working_space
 from ..blender.nodes import new_world

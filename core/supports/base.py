@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..capture.moments import Moments
-from ..light import PatchLight
+from ..light.light import PatchLight
 
 
 class Support(Protocol):

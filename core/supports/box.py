@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..capture.moments import Moments
-from ..light import PatchLight
+from ..light.light import PatchLight
 from ..measure import box_of
 from ..patterns import ONE, UU, VV, U, V
 

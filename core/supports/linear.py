@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..capture.moments import Moments
-from ..light import PatchLight
+from ..light.light import PatchLight
 from ..patterns import ONE, U, V
 
 

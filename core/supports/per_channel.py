@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..capture.moments import Moments
-from ..light import PatchLight
+from ..light.light import PatchLight
 from .base import Support
 
 # Codes of per-channel models are those of the shared ones plus this.

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..capture.moments import Moments
-from ..light import PatchLight
+from ..light.light import PatchLight
 from ..patterns import ONE, UU, UV, VV, U, V
 
 # The grid: places and weights along each axis, in standard deviations. Each keeps variance 1

@@ -9,7 +9,7 @@ import pytest
 from arto.arto_addon.blender.nodes import Nodes
 from arto.arto_addon.world.bake import bake
 from arto.arto_addon.world.detail import FINEST, detail
-from arto.core.environment import Environment, directions
+from arto.core.light.environment import Environment, directions
 from scene_tools import hdri, set_colour, smooth
 
 RADIANCE = 1e5

@@ -7,7 +7,7 @@ import pytest
 from arto.arto_addon.relight import relight
 from arto.arto_addon.world import kept
 from arto.core import exr
-from arto.core.light import PatchLight
+from arto.core.light.light import PatchLight
 from arto.core.preview import Preview
 from scene_tools import captured, holding_out
 from shot_tools import comp_by_cycles, cycles_catcher, relit_and_share, with_catcher

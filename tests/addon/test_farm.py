@@ -20,10 +20,10 @@ from arto.arto_addon.farm import templates
 from arto.arto_addon.farm.gather import gather
 from arto.arto_addon.shot import paths
 from arto.core.capture.capture_set import CaptureSet
-from arto.core.environment import Environment
 from arto.core.errors import ArtoError, FarmError
 from arto.core.field import Field
-from arto.core.light import PatchLight
+from arto.core.light.environment import Environment
+from arto.core.light.light import PatchLight
 from arto.core.metrics import mean_relative_error
 from arto.core.relight import relight
 from scene_tools import captured

@@ -14,7 +14,7 @@ from arto.arto_addon.shot import paths
 from arto.arto_addon.world import kept
 from arto.core import exr
 from arto.core.errors import SceneError
-from arto.core.light import PatchLight
+from arto.core.light.light import PatchLight
 from scene_tools import (
     captured,
     composited,

@@ -13,10 +13,10 @@ from arto.arto_addon.stage import small
 from arto.arto_addon.world import lamp_render as lamps
 from arto.arto_addon.world.bake import bake
 from arto.core import exr
-from arto.core.environment import Environment
 from arto.core.errors import SceneError
 from arto.core.field import Field
-from arto.core.lamps import split
+from arto.core.light.environment import Environment
+from arto.core.light.lamps import split
 from scene_tools import captured, cycles, differences, small_scene, snapshot
 
 

@@ -17,7 +17,7 @@ from arto.arto_addon.world import kept
 from arto.core import exr
 from arto.core.errors import CaptureSetError, SceneError
 from arto.core.hemicube import Hemicube
-from arto.core.light import PatchLight
+from arto.core.light.light import PatchLight
 from scene_tools import captured, hdri, small_scene, smooth
 
 

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from arto.core import exr, fit
 from arto.core.capture import basis_images, capture_set
-from arto.core.environment import Environment
 from arto.core.field import Field
 from arto.core.hemicube import Hemicube
+from arto.core.light.environment import Environment
 from arto.core.patterns import PatternSet, monomials, pattern_set
 from arto.core.region import Region
 from hypothesis import settings

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from arto.core.bins import bin_coordinate, default_resolution
-from arto.core.environment import Environment
 from arto.core.hemicube import Hemicube
-from arto.core.light import PatchLight
+from arto.core.light.bins import bin_coordinate, default_resolution
+from arto.core.light.environment import Environment
+from arto.core.light.light import PatchLight
 from hypothesis import strategies as st
 
 seeds = st.integers(0, 2**31)
@@ -37,7 +37,7 @@ def test_a_map_of_another_size_or_cube_is_not_mistaken(noisy, monkeypatch) -> No
     for cube in cubes:
         for e in maps:
             for binned, r in zip(next(again), (4, 8), strict=True):
-                monkeypatch.setattr("arto.core.bins._KEPT", {})
+                monkeypatch.setattr("arto.core.light.light.bins._KEPT", {})
                 np.testing.assert_array_equal(binned, PatchLight(e, cube, r).binned)
 
 
@@ -66,7 +66,7 @@ def test_a_turned_map_is_the_map_with_its_columns_moved(noisy, texels: float) ->
 def test_the_bins_of_a_large_map_are_worked_out_in_blocks(noisy, monkeypatch) -> None:
     """They are not kept, and no array of all its samples is made: the light is the same to the
     order of a sum, which is that of the rows in both."""
-    from arto.core import bins
+    from arto.core.light import bins
 
     cube, environment = Hemicube(patches=3), noisy(4, 64)
     whole = PatchLight(environment, cube)

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from arto.core import exr
-from arto.core.environment import Environment, sample_directions
 from arto.core.errors import EnvironmentMapError, ExrError
+from arto.core.light.environment import Environment, sample_directions
 from hypothesis import given
 from hypothesis import strategies as st
 

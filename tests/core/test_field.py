@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from arto.core import fit
 from arto.core.capture.capture_set import CaptureSet
-from arto.core.environment import Environment
 from arto.core.errors import FieldError
 from arto.core.evidence import DROPPED
 from arto.core.field import HEADER, VERSION, Field
 from arto.core.field_tile import FULL
 from arto.core.field_writer import FieldWriter
 from arto.core.hemicube import Hemicube
-from arto.core.light import PatchLight
+from arto.core.light.environment import Environment
+from arto.core.light.light import PatchLight
 from arto.core.patterns import pattern_set
 from arto.core.region import Region
 from arto.core.relight import relight

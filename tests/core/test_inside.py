@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arto.core.environment import Environment
 from arto.core.errors import FieldError
 from arto.core.hemicube import Hemicube
 from arto.core.inside import drawn, parts_at, shares_at, unfolded
-from arto.core.layers import by_faces
-from arto.core.light import PatchLight
+from arto.core.light.environment import Environment
+from arto.core.light.layers import by_faces
+from arto.core.light.light import PatchLight
 from arto.core.relight import relight
 
 CUBE = Hemicube(patches=2)

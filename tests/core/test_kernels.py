@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from arto.core import field_tile, proxy
-from arto.core.environment import Environment
 from arto.core.evidence import evidence
 from arto.core.field import Field
 from arto.core.field_writer import FieldWriter
 from arto.core.hemicube import Hemicube
-from arto.core.light import PatchLight
+from arto.core.light.environment import Environment
+from arto.core.light.light import PatchLight
 from arto.core.region import Region
 from arto.core.relight import relight
 from arto.core.supports import LINEAR, NOTHING

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from arto.core.environment import Environment
 from arto.core.hemicube import Hemicube
-from arto.core.lamps import CONTRAST, WORTH, split
+from arto.core.light.environment import Environment
+from arto.core.light.lamps import CONTRAST, WORTH, split
 from hypothesis import given
 from hypothesis import strategies as st
 

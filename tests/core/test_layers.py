@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from arto.core.environment import Environment
 from arto.core.hemicube import Hemicube
-from arto.core.layers import REST, by_faces, disc, part_of, residual, share_out, shares
+from arto.core.light.environment import Environment
+from arto.core.light.layers import REST, by_faces, disc, part_of, residual, share_out, shares
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from arto.core.bins import bin_coordinate
-from arto.core.environment import Environment
 from arto.core.hemicube import FACE_NAMES, Hemicube
-from arto.core.light import PatchLight
+from arto.core.light.bins import bin_coordinate
+from arto.core.light.environment import Environment
+from arto.core.light.light import PatchLight
 from arto.core.patterns import ONE, UU, UV, VV, U, V, monomials
 from arto.core.supports import BOX, LINEAR, WHOLE
 from hypothesis import example, given, settings

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from arto.core.field import Field
 from arto.core.hemicube import Hemicube
-from arto.core.light import PatchLight
+from arto.core.light.light import PatchLight
 from arto.core.merged import MergedTile, merged
 from arto.core.region import Region
 from arto.core.relight import relight

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from arto.core import matte
 from arto.core.capture.moments import Moments
-from arto.core.environment import Environment
 from arto.core.hemicube import Hemicube
-from arto.core.light import PatchLight
+from arto.core.light.environment import Environment
+from arto.core.light.light import PatchLight
 from arto.core.measure import box_averages
 from arto.core.patterns import monomials, pattern_set
 from arto.core.search import search

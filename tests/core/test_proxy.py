@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from arto.core import field_tile
-from arto.core.environment import Environment
 from arto.core.errors import FieldError
 from arto.core.field import Field
 from arto.core.hemicube import Hemicube
-from arto.core.light import PatchLight
+from arto.core.light.environment import Environment
+from arto.core.light.light import PatchLight
 from arto.core.region import Region
 from arto.core.relight import relight
 

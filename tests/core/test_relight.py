@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from arto.core.choice import BROAD, CENTRED
-from arto.core.environment import Environment
 from arto.core.field import Field
 from arto.core.hemicube import Hemicube
-from arto.core.light import PatchLight
+from arto.core.light.environment import Environment
+from arto.core.light.light import PatchLight
 from arto.core.patterns import ONE, U, V
 from arto.core.region import Region
 from arto.core.relight import over, relight, relights

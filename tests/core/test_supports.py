@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from arto.core.capture.moments import Moments
-from arto.core.environment import Environment
 from arto.core.hemicube import Hemicube
-from arto.core.light import PatchLight
+from arto.core.light.environment import Environment
+from arto.core.light.light import PatchLight
 from arto.core.patterns import MONOMIALS, pattern_set
 from arto.core.supports import BY_CODE, SUPPORTS, Support
 

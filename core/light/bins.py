@@ -10,9 +10,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..hemicube import Hemicube
+from ..patterns import MONOMIALS, monomials
 from .environment import Environment, directions, sample_directions
-from .hemicube import Hemicube
-from .patterns import MONOMIALS, monomials
 
 # Samples of a map that are worked on at a time, and of one whose bins are kept.
 BLOCK = 1 << 20

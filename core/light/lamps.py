@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..hemicube import Hemicube
 from .environment import Environment, directions, sample_directions
-from .hemicube import Hemicube
 
 # How many times brighter than the rest of the map, on average, a lamp is.
 CONTRAST = 20.0

@@ -13,8 +13,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..hemicube import Hemicube
 from .environment import Environment, directions, sample_directions
-from .hemicube import Hemicube
 
 # The part of an environment that no other has.
 REST = "rest"

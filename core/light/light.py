@@ -13,6 +13,8 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
+from ..hemicube import Hemicube
+from ..patterns import monomials
 from .bins import (
     Samples,
     bin_centres,
@@ -22,8 +24,6 @@ from .bins import (
     sample_bins,
 )
 from .environment import Environment
-from .hemicube import Hemicube
-from .patterns import monomials
 
 
 class PatchLight:

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from . import exr
-from .errors import EnvironmentMapError
+from .. import exr
+from ..errors import EnvironmentMapError
 
 
 @dataclass(frozen=True)
