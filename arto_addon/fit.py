@@ -8,7 +8,7 @@ import bpy
 
 from ..core.capture.capture_set import CaptureSet
 from ..core.errors import CaptureSetError, FieldError
-from ..core.field import Field
+from ..core.field.field import Field
 from ..core.files import Lock
 from ..core.fit import fit as fit_captured
 from .capture import beside

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import bpy
 
-from ..core.field import Field
+from ..core.field.field import Field
 from .capture.capture import capture
 from .fit import fit
 from .relight.own import sync

@@ -23,7 +23,7 @@ from arto.arto_addon.shot import paths
 from arto.arto_addon.world.bake import bake
 from arto.core import exr, matte, metrics
 from arto.core.choice import CHOICES
-from arto.core.field import Field
+from arto.core.field.field import Field
 from arto.core.files import whole, write_text
 from arto.core.light import lamps
 from arto.core.light.environment import Environment

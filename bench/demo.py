@@ -13,7 +13,7 @@ import numpy as np
 from arto.arto_addon.shot import paths
 from arto.core import exr, metrics
 from arto.core.capture.capture_set import CaptureSet
-from arto.core.field import Field
+from arto.core.field.field import Field
 
 from . import pictures, reference, scenes
 from .machine import machine

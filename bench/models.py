@@ -17,7 +17,7 @@ from arto.arto_addon.world.bake import bake
 from arto.core import matte, metrics
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.choice import CHOICES
-from arto.core.field import Field
+from arto.core.field.field import Field
 from arto.core.fit import fit
 from arto.core.light.light import PatchLight
 from arto.core.relight import relight

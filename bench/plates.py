@@ -25,7 +25,7 @@ from arto.arto_addon.shot import paths, scene_id
 from arto.arto_addon.stage.stage import stage
 from arto.arto_addon.stage.takes import THINGS
 from arto.core import exr
-from arto.core.field import Field
+from arto.core.field.field import Field
 from arto.core.metrics import mean_relative_error
 from mathutils import Euler
 from numpy.typing import NDArray

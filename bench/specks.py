@@ -16,7 +16,7 @@ from arto.arto_addon import work
 from arto.arto_addon.capture import capture
 from arto.arto_addon.shot import paths, scene_id
 from arto.arto_addon.stage.takes import THINGS
-from arto.core.field import Field
+from arto.core.field.field import Field
 from numpy.typing import NDArray
 
 from . import reference

@@ -20,15 +20,15 @@ import numpy as np
 from arto.core import fit
 from arto.core.capture.basis_images import Around
 from arto.core.capture.capture_set import CaptureSet
-from arto.core.field import Field
-from arto.core.field_writer import FieldWriter
+from arto.core.field.field import Field
+from arto.core.field.tile_writer import TileWriter
+from arto.core.field.writer import FieldWriter
 from arto.core.hemicube import Hemicube
 from arto.core.light.environment import Environment
 from arto.core.light.light import PatchLight
 from arto.core.patterns import PatternSet, pattern_set
 from arto.core.region import Region
 from arto.core.relight import relight
-from arto.core.tile_writer import TileWriter
 from numpy.typing import NDArray
 
 Row = dict[str, Any]

@@ -15,12 +15,12 @@ from .capture.basis_images import BasisImages, TileData
 from .capture.capture_set import CaptureSet
 from .capture.moments import Moments
 from .evidence import evidence
-from .field_writer import FieldWriter, write_tile
+from .field.tile_writer import TileWriter
+from .field.writer import FieldWriter, write_tile
 from .hemicube import Hemicube
 from .patterns import PatternSet
 from .search import search
 from .supports import BOX, NOTHING, WHOLE
-from .tile_writer import TileWriter
 
 # How much of the work on a tile the first pass over its images is, about.
 READING = 0.4

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import FieldError
-from .field import Field
+from .field.field import Field
 from .hemicube import Hemicube
 from .light.environment import Environment
 from .light.layers import part_of

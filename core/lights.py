@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import FieldError
-from .field_tile import Model, Tile
+from .field.tile import Model, Tile
 from .light.light import PatchLight
 
 # Of the unpacked entries, bytes at a time: a few patches of a block.

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .catcher import catch, held_out
-from .field import HEADER, Field, proxy_folder
+from .field.field import HEADER, Field, proxy_folder
+from .field.merged import merged
+from .field.proxy import FACTORS
 from .hemicube import Hemicube
 from .light.light import PatchLight
-from .merged import merged
-from .proxy import FACTORS
 from .relight import relights
 
 # Seconds of a pixel and patch, until one was measured.

@@ -10,8 +10,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .field import Field
-from .field_tile import Model, Tile
+from .field.field import Field
+from .field.tile import Model, Tile
 from .light.light import PatchLight
 from .lights import ROOM, Lights
 from .region import Region

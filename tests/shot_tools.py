@@ -15,7 +15,7 @@ from arto.arto_addon.relight import plate, relight
 from arto.arto_addon.shot import paths
 from arto.arto_addon.stage.stage import stage
 from arto.core import exr
-from arto.core.field import Field
+from arto.core.field.field import Field
 from scene_tools import captured, hdri, small_scene, smooth
 
 

@@ -9,8 +9,8 @@ from typing import Any
 
 from ...core.capture.capture_set import HEADER, CaptureSet, write_header
 from ...core.errors import ArtoError, CaptureSetError, FieldError
-from ...core.field import Field
-from ...core.field_writer import describe, write_head
+from ...core.field.field import Field
+from ...core.field.writer import describe, write_head
 from ...core.files import PART, replace_folder
 from ...core.fit import about_of
 from .stream import Stream

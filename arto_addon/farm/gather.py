@@ -10,10 +10,10 @@ import bpy
 
 from ...core.capture.capture_set import CaptureSet, write_header
 from ...core.errors import ArtoError, FarmError
-from ...core.field import proxy_folder
+from ...core.field.field import proxy_folder
+from ...core.field.proxy import FACTORS
 from ...core.files import PART, Lock
 from ...core.fit import fit_into
-from ...core.proxy import FACTORS
 from ..capture.beside import TAKES
 from ..capture.capture import check_file, plan_of
 from ..capture.resume import empty, finish, finish_field, let_go

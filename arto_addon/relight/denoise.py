@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core import exr
-from ...core.field import Field
-from ...core.field_writer import write_head
-from ...core.tile_writer import write_layer
+from ...core.field.field import Field
+from ...core.field.tile_writer import write_layer
+from ...core.field.writer import write_head
 from ..blender.colour import working_space
 from ..blender.compositing import choose, studio
 from ..work import Progress, Steps

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ...core import exr
 from ...core.errors import SceneError
-from ...core.field import Field
+from ...core.field.field import Field
 from ...core.light.environment import Environment
 from ...core.light.layers import REST, by_faces, disc, part_of, residual, share_out, shares
 from ...core.light.light import PatchLight

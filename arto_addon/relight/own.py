@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.field import Field
+from ...core.field.field import Field
 from ...core.preview import own_light
 
 

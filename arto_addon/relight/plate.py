@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...core import cryptomatte, exr
 from ...core.errors import SceneError
 from ...core.exr.window import NO_HIT, Window
-from ...core.field import Field
+from ...core.field.field import Field
 from ..blender.colour import working_space
 from ..shot import home, paths
 from .header import header

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...core.catcher import catch_seen, held_out, of_ground
 from ...core.errors import FieldError
-from ...core.field import Field
+from ...core.field.field import Field
 from ...core.light.environment import Environment
 from ...core.light.lamps import Split, split
 from ...core.light.light import PatchLight

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...core import exr
 from ...core.errors import SceneError
-from ...core.field import Field
+from ...core.field.field import Field
 from ...core.verify import Verdict, marked, verify
 from ..shot import paths
 from ..shot.shot import layer_of

@@ -21,7 +21,7 @@ import bpy
 
 from ...core.capture.capture_set import HEADER as CAPTURE_HEADER
 from ...core.errors import ArtoError, SceneError, ShotError
-from ...core.field import HEADER as FIELD_HEADER
+from ...core.field.field import HEADER as FIELD_HEADER
 from ...core.files import settle, write_text
 from ...core.shot import Shot, safe_name, short_hash
 from . import home

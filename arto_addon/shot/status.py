@@ -8,11 +8,11 @@ from typing import Any
 
 import bpy
 
-from ...core import field
 from ...core.capture import capture_set
 from ...core.capture.capture_set import CaptureSet
 from ...core.errors import ArtoError
-from ...core.field import Field
+from ...core.field import field
+from ...core.field.field import Field
 from ...core.shot import Shot
 from . import paths, watch
 from .fingerprint import changes

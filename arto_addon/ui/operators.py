@@ -9,7 +9,7 @@ import bpy
 
 from ...core.capture.capture_set import HEADER as CAPTURE_HEADER
 from ...core.errors import ArtoError, SceneError
-from ...core.field import HEADER as FIELD_HEADER
+from ...core.field.field import HEADER as FIELD_HEADER
 from ...core.files import Lock
 from ..capture import planes
 from ..capture.capture import capture

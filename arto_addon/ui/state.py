@@ -9,9 +9,9 @@ from pathlib import Path
 
 import bpy
 
-from ...core import field
 from ...core.capture import capture_set
 from ...core.errors import ArtoError
+from ...core.field import field
 from ...core.shot import Shot
 from ..capture.planned import most
 from ..capture.room import size

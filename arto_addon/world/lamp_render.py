@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import SceneError
-from ...core.field import Field
+from ...core.field.field import Field
 from ...core.light.environment import Environment
 from ...core.region import Region
 from ..blender.colour import working_space

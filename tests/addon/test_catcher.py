@@ -16,7 +16,7 @@ from arto.arto_addon.relight.present import present_frames
 from arto.arto_addon.shot import paths
 from arto.core import exr
 from arto.core.errors import CancelledError, FieldError, SceneError
-from arto.core.field import Field
+from arto.core.field.field import Field
 from scene_tools import (
     BOX,
     add_mesh,

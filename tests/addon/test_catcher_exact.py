@@ -14,7 +14,7 @@ from arto.arto_addon.shot import paths
 from arto.core import exr
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.catcher import catch
-from arto.core.field import Field
+from arto.core.field.field import Field
 from arto.core.light.environment import Environment
 from arto.core.light.light import PatchLight
 from scene_tools import add_mesh, captured, cycles, hdri, material, set_colour, small_scene, smooth

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from arto.arto_addon.shot import paths
-from arto.core.field import Field
+from arto.core.field.field import Field
 from scene_tools import captured
 from shot_tools import comp_by_cycles, relit_and_share, with_catcher
 

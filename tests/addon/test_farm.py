@@ -21,7 +21,7 @@ from arto.arto_addon.farm.gather import gather
 from arto.arto_addon.shot import paths
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import ArtoError, FarmError
-from arto.core.field import Field
+from arto.core.field.field import Field
 from arto.core.light.environment import Environment
 from arto.core.light.light import PatchLight
 from arto.core.metrics import mean_relative_error

@@ -19,7 +19,7 @@ from arto.arto_addon.shot import paths
 from arto.arto_addon.ui import properties
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import FarmError, SceneError
-from arto.core.field import Field
+from arto.core.field.field import Field
 from scene_tools import captured
 from shot_tools import arrays, assert_same, planned_job
 

@@ -23,7 +23,7 @@ from arto.arto_addon.relight import plate
 from arto.arto_addon.shot import paths
 from arto.core import exr
 from arto.core.errors import CancelledError, FarmError, FieldError, SceneError
-from arto.core.field import Field
+from arto.core.field.field import Field
 from scene_tools import captured
 from shot_tools import (
     arrays,

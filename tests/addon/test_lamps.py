@@ -14,7 +14,7 @@ from arto.arto_addon.world import lamp_render as lamps
 from arto.arto_addon.world.bake import bake
 from arto.core import exr
 from arto.core.errors import SceneError
-from arto.core.field import Field
+from arto.core.field.field import Field
 from arto.core.light.environment import Environment
 from arto.core.light.lamps import split
 from scene_tools import captured, cycles, differences, small_scene, snapshot

@@ -15,7 +15,7 @@ from arto.arto_addon.relight.back import mix_to_scene
 from arto.arto_addon.shot import paths
 from arto.core import exr
 from arto.core.errors import SceneError
-from arto.core.field import Field
+from arto.core.field.field import Field
 from scene_tools import (
     assert_as_cycles,
     captured,

@@ -241,7 +241,7 @@ def test_an_animated_shot(scene):
     scene.arto.keep, scene.arto.adaptive = "never", True
     folders = work.run(capture_frames(scene, "ViewLayer", range(1, 4)))
     assert scene.frame_current == 2
-    from arto.core.field import Field
+    from arto.core.field.field import Field
 
     fields = [Field(f.parent / "field") for f in folders]
     assert len({str(f.hemicube.to_json()) for f in fields}) == 1

@@ -12,7 +12,7 @@ from arto.arto_addon.relight import plate, relight
 from arto.arto_addon.shot import paths
 from arto.arto_addon.stage.stage import stage
 from arto.core import exr
-from arto.core.field import Field, proxy_folder
+from arto.core.field.field import Field, proxy_folder
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 from scene_tools import captured, small_scene

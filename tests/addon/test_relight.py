@@ -14,7 +14,7 @@ from arto.arto_addon.shot import paths
 from arto.arto_addon.world.bake import bake
 from arto.core import exr
 from arto.core.errors import ArtoError, CaptureSetError, FieldError, SceneError
-from arto.core.field import Field
+from arto.core.field.field import Field
 from arto.core.light.light import PatchLight
 from arto.core.metrics import mean_relative_error
 from arto.core.relight import relight as relight_field

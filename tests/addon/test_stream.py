@@ -12,7 +12,7 @@ from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import paths
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import CaptureSetError, PatternError, SceneError
-from arto.core.field import Field
+from arto.core.field.field import Field
 from scene_tools import small_scene
 from shot_tools import unfinished
 

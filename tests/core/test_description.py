@@ -16,7 +16,7 @@ from arto.core import fit
 from arto.core.capture import capture_set
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import ArtoError
-from arto.core.field import Field
+from arto.core.field.field import Field
 from arto.core.hemicube import Hemicube
 from arto.core.patterns import pattern_set
 

@@ -12,9 +12,10 @@ from arto.core import fit
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import FieldError
 from arto.core.evidence import DROPPED
-from arto.core.field import HEADER, VERSION, Field
-from arto.core.field_tile import FULL
-from arto.core.field_writer import FieldWriter
+from arto.core.field.field import HEADER, VERSION, Field
+from arto.core.field.tile import FULL
+from arto.core.field.tile_writer import TileWriter
+from arto.core.field.writer import FieldWriter
 from arto.core.hemicube import Hemicube
 from arto.core.light.environment import Environment
 from arto.core.light.light import PatchLight
@@ -22,7 +23,6 @@ from arto.core.patterns import pattern_set
 from arto.core.region import Region
 from arto.core.relight import relight
 from arto.core.supports import BOX, LINEAR, NOTHING, REST, WHOLE
-from arto.core.tile_writer import TileWriter
 
 CUBE = Hemicube(faces=("top", "back"), patches=2)
 

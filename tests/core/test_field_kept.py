@@ -11,7 +11,7 @@ import pytest
 from arto.core import fit
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import CaptureSetError, FieldError, PatternError
-from arto.core.field import Field
+from arto.core.field.field import Field
 from arto.core.hemicube import Hemicube
 from arto.core.region import Region
 

@@ -9,17 +9,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arto.core import field_tile, proxy
 from arto.core.evidence import evidence
-from arto.core.field import Field
-from arto.core.field_writer import FieldWriter
+from arto.core.field import proxy
+from arto.core.field import tile as field_tile
+from arto.core.field.field import Field
+from arto.core.field.tile_writer import TileWriter
+from arto.core.field.writer import FieldWriter
 from arto.core.hemicube import Hemicube
 from arto.core.light.environment import Environment
 from arto.core.light.light import PatchLight
 from arto.core.region import Region
 from arto.core.relight import relight
 from arto.core.supports import LINEAR, NOTHING
-from arto.core.tile_writer import TileWriter
 
 CUBE = Hemicube(patches=4)
 SHAPE = (96, 128)

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arto.core.field import Field
+from arto.core.field.field import Field
+from arto.core.field.merged import MergedTile, merged
 from arto.core.hemicube import Hemicube
 from arto.core.light.light import PatchLight
-from arto.core.merged import MergedTile, merged
 from arto.core.region import Region
 from arto.core.relight import relight
 

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arto.core.field import Field
+from arto.core.field.field import Field
+from arto.core.field.tile_writer import write_layer
 from arto.core.hemicube import Hemicube
 from arto.core.light.light import PatchLight
 from arto.core.preview import Preview, own_light
 from arto.core.relight import relight
-from arto.core.tile_writer import write_layer
 
 CUBE = Hemicube(patches=2)
 SHAPE = (24, 32)

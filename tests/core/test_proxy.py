@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arto.core import field_tile
 from arto.core.errors import FieldError
-from arto.core.field import Field
+from arto.core.field import tile as field_tile
+from arto.core.field.field import Field
 from arto.core.hemicube import Hemicube
 from arto.core.light.environment import Environment
 from arto.core.light.light import PatchLight

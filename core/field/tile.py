@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import FieldError
-from .region import Region
-from .supports import BY_CODE, NOTHING, REST, Support
+from ..errors import FieldError
+from ..region import Region
+from ..supports import BY_CODE, NOTHING, REST, Support
 
 # The arrays of a tile stand block after block: so many pixels at a time, row by row. A block is
 # what a thread adds up and what a crop reads; whole bytes of bits.

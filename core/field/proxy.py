@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .hemicube import Hemicube
-from .measure import box_averages, box_of
-from .patterns import UU, VV, U, V
-from .region import Region
-from .supports import BOX, LINEAR, WHOLE
+from ..hemicube import Hemicube
+from ..measure import box_averages, box_of
+from ..patterns import UU, VV, U, V
+from ..region import Region
+from ..supports import BOX, LINEAR, WHOLE
 from .tile_writer import TileWriter
 
 FACTORS = (2, 4, 8)

@@ -7,10 +7,10 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from .errors import FieldError
+from ..errors import FieldError
+from ..files import PART, replace_folder, write_text
+from ..hemicube import Hemicube
 from .field import HEADER, VERSION, proxy_folder
-from .files import PART, replace_folder, write_text
-from .hemicube import Hemicube
 from .proxy import FACTORS, proxies
 from .tile_writer import TileWriter
 

@@ -8,12 +8,12 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from .capture.basis_images import OF_ONE_RAY
-from .errors import FieldError
-from .field_tile import FULL, LARGEST, blocks_of, steps_of
-from .files import whole
-from .region import Region
-from .supports import BY_CODE, NOTHING
+from ..capture.basis_images import OF_ONE_RAY
+from ..errors import FieldError
+from ..files import whole
+from ..region import Region
+from ..supports import BY_CODE, NOTHING
+from .tile import FULL, LARGEST, blocks_of, steps_of
 
 
 class TileWriter:

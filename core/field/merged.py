@@ -13,10 +13,10 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ..region import Region
+from ..supports import Support
 from .field import Field
-from .field_tile import Model, Tile
-from .region import Region
-from .supports import Support
+from .tile import Model, Tile
 
 # Blocks: threads that add up, on the machines that artists have at the least.
 BLOCKS = 2

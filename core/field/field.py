@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .description import Description
-from .errors import FieldError, HemicubeError
-from .field_tile import OTHERS, Tile
-from .hemicube import Hemicube
+from ..description import Description
+from ..errors import FieldError, HemicubeError
+from ..hemicube import Hemicube
+from .tile import OTHERS, Tile
 
 VERSION = 2
 HEADER = "field.json"
