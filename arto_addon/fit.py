@@ -10,7 +10,7 @@ from ..core.capture.capture_set import CaptureSet
 from ..core.errors import CaptureSetError, FieldError
 from ..core.field.field import Field
 from ..core.files import Lock
-from ..core.fit import fit as fit_captured
+from ..core.fit.fit import fit as fit_captured
 from .capture import beside
 from .relight.denoise import cleaned
 from .shot import paths, status

@@ -74,7 +74,7 @@ def _models(options: argparse.Namespace) -> None:
 def _accuracy(options: argparse.Namespace) -> None:
     import json as reader
 
-    from arto.core.choice import CHOICES, SEARCH
+    from arto.core.fit.choice import CHOICES, SEARCH
 
     from . import accuracy_report as report
     from . import scenes

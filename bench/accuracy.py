@@ -21,10 +21,11 @@ from arto.arto_addon import fit, work
 from arto.arto_addon.relight import denoise, relight
 from arto.arto_addon.shot import paths
 from arto.arto_addon.world.bake import bake
-from arto.core import exr, matte, metrics
-from arto.core.choice import CHOICES
+from arto.core import exr, metrics
 from arto.core.field.field import Field
 from arto.core.files import whole, write_text
+from arto.core.fit import matte
+from arto.core.fit.choice import CHOICES
 from arto.core.light import lamps
 from arto.core.light.environment import Environment
 from arto.core.light.light import PatchLight

@@ -14,11 +14,12 @@ import numpy as np
 from arto.arto_addon import work
 from arto.arto_addon.capture import capture
 from arto.arto_addon.world.bake import bake
-from arto.core import matte, metrics
+from arto.core import metrics
 from arto.core.capture.capture_set import CaptureSet
-from arto.core.choice import CHOICES
 from arto.core.field.field import Field
-from arto.core.fit import fit
+from arto.core.fit import matte
+from arto.core.fit.choice import CHOICES
+from arto.core.fit.fit import fit
 from arto.core.light.light import PatchLight
 from arto.core.relight import relight
 from arto.core.supports import NOTHING, REST

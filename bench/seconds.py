@@ -19,7 +19,7 @@ from arto.arto_addon import fit, work
 from arto.arto_addon.capture import capture
 from arto.arto_addon.relight import relight
 from arto.arto_addon.world.bake import bake
-from arto.core.choice import SEARCH
+from arto.core.fit.choice import SEARCH
 from arto.core.light import lamps
 
 from . import reference

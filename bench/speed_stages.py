@@ -17,12 +17,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from arto.core import fit
 from arto.core.capture.basis_images import Around
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.field.field import Field
 from arto.core.field.tile_writer import TileWriter
 from arto.core.field.writer import FieldWriter
+from arto.core.fit import fit
 from arto.core.hemicube import Hemicube
 from arto.core.light.environment import Environment
 from arto.core.light.light import PatchLight

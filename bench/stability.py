@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 from arto.core.capture.moments import Moments
+from arto.core.fit.search import search
 from arto.core.hemicube import Hemicube
 from arto.core.light.environment import Environment
 from arto.core.light.light import PatchLight
 from arto.core.patterns import PATTERN_SETS, PatternSet, monomials
-from arto.core.search import search
 from arto.core.supports import BOX, SUPPORTS
 from numpy.typing import NDArray
 

@@ -13,9 +13,9 @@ import bpy
 from ...core import exr
 from ...core.capture.basis_images import GRAIN, GROUP, group_name
 from ...core.capture.capture_set import write_header
-from ...core.choice import check as check_choice
 from ...core.errors import ArtoError, CaptureSetError
 from ...core.files import Lock, whole
+from ...core.fit.choice import check as check_choice
 from ...core.hemicube import Hemicube
 from ...core.patterns import pattern_set
 from ...core.region import Region

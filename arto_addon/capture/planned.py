@@ -11,8 +11,8 @@ import bpy
 
 from ...core.capture.basis_images import GRAIN
 from ...core.capture.refine import check as can_refine
-from ...core.choice import check as check_choice
 from ...core.errors import ArtoError
+from ...core.fit.choice import check as check_choice
 from ...core.hemicube import Hemicube
 from ...core.patterns import pattern_set
 from ...core.region import Region

@@ -12,7 +12,7 @@ from ...core.errors import ArtoError, CaptureSetError, FieldError
 from ...core.field.field import Field
 from ...core.field.writer import describe, write_head
 from ...core.files import PART, replace_folder
-from ...core.fit import about_of
+from ...core.fit.fit import about_of
 from .stream import Stream
 
 

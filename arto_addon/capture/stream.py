@@ -13,7 +13,7 @@ from typing import Any
 
 from ...core.capture.capture_set import CaptureSet
 from ...core.errors import CancelledError
-from ...core.fit import fit_into
+from ...core.fit.fit import fit_into
 
 
 class Stream:

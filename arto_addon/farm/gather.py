@@ -13,7 +13,7 @@ from ...core.errors import ArtoError, FarmError
 from ...core.field.field import proxy_folder
 from ...core.field.proxy import FACTORS
 from ...core.files import PART, Lock
-from ...core.fit import fit_into
+from ...core.fit.fit import fit_into
 from ..capture.beside import TAKES
 from ..capture.capture import check_file, plan_of
 from ..capture.resume import empty, finish, finish_field, let_go

@@ -17,7 +17,7 @@ import bpy
 from ...core.capture.capture_set import CaptureSet
 from ...core.errors import FarmError
 from ...core.files import PART, replace_folder, write_text
-from ...core.fit import fit_into
+from ...core.fit.fit import fit_into
 from ...core.shot import Shot
 from ..blender.output import write_to
 from ..capture import room

@@ -11,8 +11,8 @@ from typing import Any
 import bpy
 
 from ...core.capture.capture_set import write_header
-from ...core.choice import check as check_choice
 from ...core.errors import FarmError
+from ...core.fit.choice import check as check_choice
 from ...core.patterns import pattern_set
 from ..capture import room
 from ..capture.asked import asked, begun

@@ -13,7 +13,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ...core.choice import CHOICES
+from ...core.fit.choice import CHOICES
 from ...core.hemicube import FACE_NAMES, PRESETS
 from ...core.patterns import PATTERN_SETS
 

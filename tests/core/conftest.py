@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from arto.core import exr, fit
+from arto.core import exr
 from arto.core.capture import basis_images, capture_set
 from arto.core.field.field import Field
+from arto.core.fit import fit
 from arto.core.hemicube import Hemicube
 from arto.core.light.environment import Environment
 from arto.core.patterns import PatternSet, monomials, pattern_set

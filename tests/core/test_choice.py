@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from arto.core.capture.capture_set import CaptureSet
-from arto.core.choice import BROAD, CHOICES, check, choose
 from arto.core.errors import FieldError, PatternError
-from arto.core.evidence import DROPPED, SUN, Evidence, evidence
 from arto.core.field.tile import Tile
 from arto.core.field.tile_writer import TileWriter
-from arto.core.fit import fit_tile
+from arto.core.fit.choice import BROAD, CHOICES, check, choose
+from arto.core.fit.evidence import DROPPED, SUN, Evidence, evidence
+from arto.core.fit.fit import fit_tile
 from arto.core.hemicube import Hemicube
 from arto.core.patterns import PatternSet, pattern_set
 from arto.core.supports import BOX, BY_CODE, LINEAR, NOTHING, REST, SUPPORTS, WHOLE

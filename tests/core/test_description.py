@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from arto.core import fit
 from arto.core.capture import capture_set
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import ArtoError
 from arto.core.field.field import Field
+from arto.core.fit import fit
 from arto.core.hemicube import Hemicube
 from arto.core.patterns import pattern_set
 

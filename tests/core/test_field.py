@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arto.core import fit
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import FieldError
-from arto.core.evidence import DROPPED
 from arto.core.field.field import HEADER, VERSION, Field
 from arto.core.field.tile import FULL
 from arto.core.field.tile_writer import TileWriter
 from arto.core.field.writer import FieldWriter
+from arto.core.fit import fit
+from arto.core.fit.evidence import DROPPED
 from arto.core.hemicube import Hemicube
 from arto.core.light.environment import Environment
 from arto.core.light.light import PatchLight
@@ -297,8 +297,8 @@ def test_a_field_without_tiles_has_no_layers(tmp_path: Path) -> None:
 
 def rest_field(folder: Path, coefficients: np.ndarray) -> Field:
     """A field of one row: (K, n, 3) coefficients through the choice as the fit makes it."""
-    from arto.core.choice import choose
-    from arto.core.evidence import evidence
+    from arto.core.fit.choice import choose
+    from arto.core.fit.evidence import evidence
 
     cube = Hemicube(patches=1)
     white = pattern_set("linear")

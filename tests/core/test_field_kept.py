@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arto.core import fit
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import CaptureSetError, FieldError, PatternError
 from arto.core.field.field import Field
+from arto.core.fit import fit
 from arto.core.hemicube import Hemicube
 from arto.core.region import Region
 

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arto.core.evidence import evidence
 from arto.core.field import proxy
 from arto.core.field import tile as field_tile
 from arto.core.field.field import Field
 from arto.core.field.tile_writer import TileWriter
 from arto.core.field.writer import FieldWriter
+from arto.core.fit.evidence import evidence
 from arto.core.hemicube import Hemicube
 from arto.core.light.environment import Environment
 from arto.core.light.light import PatchLight

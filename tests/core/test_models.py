@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from arto.core import matte
 from arto.core.capture.moments import Moments
+from arto.core.fit import matte
+from arto.core.fit.search import search
 from arto.core.hemicube import Hemicube
 from arto.core.light.environment import Environment
 from arto.core.light.light import PatchLight
 from arto.core.measure import box_averages
 from arto.core.patterns import monomials, pattern_set
-from arto.core.search import search
 from arto.core.supports import PER_CHANNEL, SUPPORTS
 
 SEES_A_BOX = ("moments", "moments_uv")

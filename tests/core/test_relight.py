@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arto.core.choice import BROAD, CENTRED
 from arto.core.field.field import Field
+from arto.core.fit.choice import BROAD, CENTRED
 from arto.core.hemicube import Hemicube
 from arto.core.light.environment import Environment
 from arto.core.light.light import PatchLight

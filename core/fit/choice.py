@@ -22,12 +22,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .capture.moments import Moments
-from .errors import FieldError
+from ..capture.moments import Moments
+from ..errors import FieldError
+from ..measure import Extent
+from ..patterns import ONE, UU, VV, PatternSet, U, V
+from ..supports import BOX, LINEAR, NOTHING, PER_CHANNEL, SUPPORTS, WHOLE, Support
 from .evidence import Evidence
-from .measure import Extent
-from .patterns import ONE, UU, VV, PatternSet, U, V
-from .supports import BOX, LINEAR, NOTHING, PER_CHANNEL, SUPPORTS, WHOLE, Support
 
 SEARCH = "search"
 STAGE_AND_MATTE = "stage_and_matte"

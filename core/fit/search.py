@@ -15,8 +15,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .measure import Extent, box_averages
-from .patterns import PatternSet
+from ..measure import Extent, box_averages
+from ..patterns import PatternSet
 
 # The previous pixel's support is taken up where the coefficients differ by less than this share.
 NEARLY_EQUAL = 0.1

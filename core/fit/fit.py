@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..capture.basis_images import BasisImages, TileData
+from ..capture.capture_set import CaptureSet
+from ..capture.moments import Moments
+from ..field.tile_writer import TileWriter
+from ..field.writer import FieldWriter, write_tile
+from ..hemicube import Hemicube
+from ..patterns import PatternSet
+from ..supports import BOX, NOTHING, WHOLE
 from . import choice as choices
-from .capture.basis_images import BasisImages, TileData
-from .capture.capture_set import CaptureSet
-from .capture.moments import Moments
 from .evidence import evidence
-from .field.tile_writer import TileWriter
-from .field.writer import FieldWriter, write_tile
-from .hemicube import Hemicube
-from .patterns import PatternSet
 from .search import search
-from .supports import BOX, NOTHING, WHOLE
 
 # How much of the work on a tile the first pass over its images is, about.
 READING = 0.4

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .capture.moments import Moments
-from .hemicube import Hemicube
-from .light.light import PatchLight, bin_coordinate
-from .patterns import PatternSet
+from ..capture.moments import Moments
+from ..hemicube import Hemicube
+from ..light.light import PatchLight, bin_coordinate
+from ..patterns import PatternSet
 
 # Directions that a cap is averaged over.
 SAMPLES = 64
