@@ -9,13 +9,13 @@ import bpy
 from ..core.field.field import Field
 from .capture.capture import capture
 from .fit import fit
-from .relight.own import sync
-from .relight.present import present
+from .plate.present import present
 from .relight.relight import compute
 from .shot import paths
 from .shot.shot import layer_of
 from .work import Progress, Steps, part_of
 from .world.check import world_of
+from .world.own import sync
 
 # Of the whole work, what the capture is, and what fitting is where it was not done meanwhile.
 CAPTURED, FITTED = 0.9, 0.95

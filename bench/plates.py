@@ -20,7 +20,8 @@ import numpy as np
 from arto.arto_addon import work
 from arto.arto_addon.blender.output import float_exr
 from arto.arto_addon.capture import capture
-from arto.arto_addon.relight import plate, relight
+from arto.arto_addon.plate import plate
+from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import paths, scene_id
 from arto.arto_addon.stage.stage import stage
 from arto.arto_addon.stage.takes import THINGS

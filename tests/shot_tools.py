@@ -11,7 +11,8 @@ from arto.arto_addon import fit, work
 from arto.arto_addon.blender.output import float_exr
 from arto.arto_addon.farm.job import Job
 from arto.arto_addon.farm.plan import plan
-from arto.arto_addon.relight import plate, relight
+from arto.arto_addon.plate import plate
+from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import paths
 from arto.arto_addon.stage.stage import stage
 from arto.core import exr

@@ -26,11 +26,11 @@ from ..blender.compositing import places_of_groups
 from ..capture.capture import capture
 from ..capture.sequence import capture_frames
 from ..fit import fit
-from ..relight.composite import save_composite
+from ..plate.composite import save_composite
+from ..plate.verify import verify_plate
 from ..relight.looks import relight_looks
 from ..relight.many import frames_of, relight_many
 from ..relight.relight import compute
-from ..relight.verify import verify_plate
 from ..shoot import shoot
 from ..shot import home
 from ..work import STOPPED, Progress, Render, run

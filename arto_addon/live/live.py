@@ -25,9 +25,8 @@ from ...core.region import Region
 from ..blender.pictures import put
 from ..blender.quitting import not_when_quitting, when_quitting
 from ..job import session
+from ..plate.plate import name_of
 from ..relight.light_key import HEADER, light_key
-from ..relight.own import gains_of
-from ..relight.plate import name_of
 from ..relight.relight import Shown
 from ..shot import paths, watch
 from ..shot.shot import check_same_shot, layer_of
@@ -36,6 +35,7 @@ from ..world.background import holds_out
 from ..world.check import check_world, world_of
 from ..world.kept import shows
 from ..world.lamp_render import region_of
+from ..world.own import gains_of
 from . import maps
 from .viewer import Viewer, Wish
 

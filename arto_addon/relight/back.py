@@ -17,13 +17,13 @@ from ...core.shot import safe_name
 from ..blender.colour import working_space
 from ..blender.compositing import compositor
 from ..blender.nodes import new_world
+from ..plate.mixer import EXPOSURE_SOCKET, SOURCE
+from ..plate.plate import layers_file, shown_file, world_file
 from ..shot import paths
 from ..shot.shot import layer_of
 from ..world import kept
 from ..world.check import check_world
 from . import layers
-from .mixer import EXPOSURE_SOCKET, SOURCE
-from .plate import layers_file, shown_file, world_file
 from .relight import Shown
 
 WORLD = "ARTO Mix"

@@ -19,8 +19,8 @@ from ...core.field.tile_writer import write_layer
 from ...core.field.writer import write_head
 from ..blender.colour import working_space
 from ..blender.compositing import choose, studio
+from ..plate.plate import mixed
 from ..work import Progress, Steps
-from .plate import mixed
 
 _available: list[bool] = []
 

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.catcher import Caught
+from ..plate import plate
 from ..work import Progress, Steps
-from . import layers, plate
+from . import layers
 
 if TYPE_CHECKING:
     from .relight import Ready, Shown

@@ -19,8 +19,8 @@ from ...core.relight import relight
 from ..shot.shot import layer_of
 from ..world import kept
 from ..world.check import check_world
+from ..world.own import own_of
 from .layers import parts_of
-from .own import own_of
 from .relight import Shown
 
 IMAGE, FROM = "ARTO Inside", "ARTO Light From"

@@ -23,13 +23,7 @@ from ...core.light.layers import REST, by_faces, disc, part_of, residual, share_
 from ...core.light.light import PatchLight
 from ...core.relight import relights, together
 from ...core.shot import safe_name
-from ..shot import paths
-from ..work import Progress, Steps
-from ..world import kept
-from ..world.lamp_render import lamp_light, lamp_samples
-from . import denoise
-from .own import gains_of
-from .plate import (
+from ..plate.plate import (
     comp_file,
     data_file,
     full_file,
@@ -40,6 +34,12 @@ from .plate import (
     window_of,
     world_file,
 )
+from ..shot import paths
+from ..work import Progress, Steps
+from ..world import kept
+from ..world.lamp_render import lamp_light, lamp_samples
+from ..world.own import gains_of
+from . import denoise
 
 if TYPE_CHECKING:
     from .relight import Ready, Shown

@@ -7,7 +7,7 @@ import hashlib
 import bpy
 
 from ..world.kept import shows
-from .own import gains_of
+from ..world.own import gains_of
 
 # In a plate's header.
 HEADER = "arto.light key"

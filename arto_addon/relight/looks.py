@@ -9,11 +9,11 @@ import bpy
 
 from ...core.errors import SceneError
 from ...core.relight import together
+from ..plate.present import present
 from ..shot import paths
 from ..shot.shot import check_same_shot, layer_of
 from ..work import Progress, Steps
 from ..world.check import world_of
-from .present import present
 from .relight import Light, Ready, Shown, finish, make_ready
 
 

@@ -16,11 +16,11 @@ from ...core.relight import together
 from ...core.shot import Shot, safe_name
 from ..blender.nodes import new_world, shader_tree
 from ..capture.sequence import frame_kept
+from ..plate.present import present_frames
 from ..shot import paths
 from ..shot.shot import check_same_shot, shot_of
 from ..work import Progress, Steps
 from ..world.check import check_world
-from .present import present_frames
 from .relight import Light, Ready, Shown, finish, make_ready
 
 

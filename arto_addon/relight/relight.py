@@ -22,6 +22,9 @@ from ...core.region import Region
 from ...core.relight import over, relights
 from ..capture import beside
 from ..capture.plan import SAMPLED
+from ..plate import plate
+from ..plate.footage import footage
+from ..plate.present import present
 from ..shot import paths
 from ..shot.shot import check_same_shot, layer_of
 from ..shot.status import changed_since
@@ -30,10 +33,8 @@ from ..world import kept
 from ..world.background import background, background_with_holes, holds_out, without_holes
 from ..world.check import check_world, differs_by_rays
 from ..world.lamp_render import brightness, lamp_light, lamp_samples, region_of
-from . import denoise, files, light_key, plate
-from .footage import footage
-from .own import own_of
-from .present import present
+from ..world.own import own_of
+from . import denoise, files, light_key
 
 # From this share of the light on the lamps are the picture, and what the field adds is denoised
 # with them: by themselves, beside darkness, they come out of the denoiser worse (docs/accuracy.md).

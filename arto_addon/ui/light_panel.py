@@ -11,9 +11,9 @@ from ...core import exr
 from ...core.errors import ArtoError
 from ..blender.compositing import compositor
 from ..live import live
+from ..plate.plate import name_of
+from ..plate.present import MIX
 from ..relight.layers import prefix_of
-from ..relight.plate import name_of
-from ..relight.present import MIX
 from ..shot import paths, status
 from ..world import controls
 from ..world.check import world_of

@@ -10,8 +10,9 @@ import numpy as np
 from ...core.errors import ArtoError
 from ..blender.pictures import put
 from ..live.live import IMAGE as LIVE
-from ..relight import compare, inside
-from ..relight.plate import name_of
+from ..plate import compare
+from ..plate.plate import name_of
+from ..relight import inside
 from ..world import controls
 from ..world.check import world_of
 from .operators import Quick, can_relight, free

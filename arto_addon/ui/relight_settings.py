@@ -15,8 +15,9 @@ from bpy.props import (
     StringProperty,
 )
 
-from ..relight import compare, looks
-from ..relight.present import use
+from ..plate import compare
+from ..plate.present import use
+from ..relight import looks
 
 
 def _use_chosen(self: RelightSettings, context: bpy.types.Context) -> None:

@@ -8,10 +8,10 @@ import bpy
 
 from ...core import exr
 from ...core.errors import SceneError
-from ..relight import compare
-from ..relight.composite import save_composite
-from ..relight.plate import name_of, show, shown_file
-from ..relight.verify import verify_plate
+from ..plate import compare
+from ..plate.composite import save_composite
+from ..plate.plate import name_of, show, shown_file
+from ..plate.verify import verify_plate
 from ..shot import paths
 from ..work import Steps
 from .long_work import LongWork

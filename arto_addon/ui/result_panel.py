@@ -10,8 +10,8 @@ import bpy
 from ...core import exr
 from ...core.errors import ArtoError
 from ..job import session
+from ..plate.verify import verify_file
 from ..relight.light_key import HEADER, light_key
-from ..relight.verify import verify_file
 from ..shot import paths, status
 from ..shot.shot import layer_of
 from ..world.check import world_of

@@ -11,14 +11,16 @@ from bpy.app.handlers import persistent
 from ..job import session, snapshot
 from ..job.session import Job
 from ..live import live
-from ..relight import compare, inside, own
+from ..plate import compare
+from ..plate.plate import name_of, show
+from ..plate.present import present, present_frames
+from ..plate.verify import verify_file
+from ..relight import inside
 from ..relight.many import frames_of
-from ..relight.plate import name_of, show
-from ..relight.present import present, present_frames
-from ..relight.verify import verify_file
 from ..shot import paths
 from ..shot.shot import layer_of
 from ..shot.status import field_of
+from ..world import own
 from .reveal import reveal
 
 _keys: list[tuple[Any, Any]] = []

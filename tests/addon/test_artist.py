@@ -8,11 +8,12 @@ import pytest
 from arto.arto_addon import fit, shoot, work
 from arto.arto_addon.blender.compositing import compositor
 from arto.arto_addon.capture import planes
-from arto.arto_addon.relight import compare, inside, looks
-from arto.arto_addon.relight.composite import save_composite
-from arto.arto_addon.relight.present import present, use
+from arto.arto_addon.plate import compare
+from arto.arto_addon.plate.composite import save_composite
+from arto.arto_addon.plate.present import present, use
+from arto.arto_addon.plate.verify import verify_file, verify_plate
+from arto.arto_addon.relight import inside, looks
 from arto.arto_addon.relight.relight import compute
-from arto.arto_addon.relight.verify import verify_file, verify_plate
 from arto.arto_addon.shot import paths, status
 from arto.arto_addon.stage.settings import samples_of
 from arto.arto_addon.ui import overlay, result_panel, state

@@ -15,7 +15,8 @@ import pytest
 from arto.arto_addon import fit, work
 from arto.arto_addon.blender.compositing import compositor, new_compositor
 from arto.arto_addon.blender.version import FIVE
-from arto.arto_addon.relight import footage, relight
+from arto.arto_addon.plate import footage
+from arto.arto_addon.relight import relight
 from arto.arto_addon.relight.back import mix_of
 from arto.arto_addon.world import kept
 from arto.arto_addon.world.background import background

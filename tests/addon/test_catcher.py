@@ -10,9 +10,9 @@ import pytest
 from arto.arto_addon import fit, work
 from arto.arto_addon.capture import capture, room
 from arto.arto_addon.capture.sequence import capture_frames
-from arto.arto_addon.relight import plate
+from arto.arto_addon.plate import plate
+from arto.arto_addon.plate.present import present_frames
 from arto.arto_addon.relight.many import relight_many
-from arto.arto_addon.relight.present import present_frames
 from arto.arto_addon.shot import paths
 from arto.core import exr
 from arto.core.errors import CancelledError, FieldError, SceneError

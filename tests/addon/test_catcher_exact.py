@@ -9,7 +9,8 @@ import pytest
 from arto.arto_addon import fit, work
 from arto.arto_addon.blender.colour import working_space
 from arto.arto_addon.capture.beside import TAKES
-from arto.arto_addon.relight import plate, relight
+from arto.arto_addon.plate import plate
+from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import paths
 from arto.core import exr
 from arto.core.capture.capture_set import CaptureSet

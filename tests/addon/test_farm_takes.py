@@ -19,7 +19,7 @@ from arto.arto_addon.farm import gather as gathering
 from arto.arto_addon.farm import part as parts
 from arto.arto_addon.farm import templates
 from arto.arto_addon.farm.gather import gather
-from arto.arto_addon.relight import plate
+from arto.arto_addon.plate import plate
 from arto.arto_addon.shot import paths
 from arto.core import exr
 from arto.core.errors import CancelledError, FarmError, FieldError, SceneError

@@ -8,8 +8,9 @@ import OpenImageIO
 import pytest
 from arto.arto_addon import work
 from arto.arto_addon.blender.colour import working_space
-from arto.arto_addon.relight import plate, relight
-from arto.arto_addon.relight.footage import footage
+from arto.arto_addon.plate import plate
+from arto.arto_addon.plate.footage import footage
+from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import paths
 from arto.arto_addon.world import kept
 from arto.core import exr

@@ -9,7 +9,8 @@ import pytest
 from arto.arto_addon import work
 from arto.arto_addon.blender.output import set_format
 from arto.arto_addon.blender.version import FIVE
-from arto.arto_addon.relight import plate, relight
+from arto.arto_addon.plate import plate
+from arto.arto_addon.relight import relight
 from arto.arto_addon.relight.back import mix_to_scene
 from arto.arto_addon.relight.many import relight_many
 from arto.arto_addon.shot import paths

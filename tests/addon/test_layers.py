@@ -10,7 +10,8 @@ import pytest
 from arto.arto_addon import work
 from arto.arto_addon.blender.compositing import add_output, compositor, new_compositor
 from arto.arto_addon.blender.nodes import new_world
-from arto.arto_addon.relight import plate, relight
+from arto.arto_addon.plate import plate
+from arto.arto_addon.relight import relight
 from arto.arto_addon.relight.back import mix_to_scene
 from arto.arto_addon.shot import paths
 from arto.core import exr

@@ -8,7 +8,8 @@ import OpenImageIO
 import pytest
 from arto.arto_addon import work
 from arto.arto_addon.blender.output import float_exr
-from arto.arto_addon.relight import plate, relight
+from arto.arto_addon.plate import plate
+from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import paths
 from arto.arto_addon.stage.stage import stage
 from arto.core import exr

@@ -13,8 +13,9 @@ import bpy
 import pytest
 from arto.arto_addon import fit, work
 from arto.arto_addon.capture import capture
-from arto.arto_addon.relight import many, plate
-from arto.arto_addon.relight.verify import verify_file
+from arto.arto_addon.plate import plate
+from arto.arto_addon.plate.verify import verify_file
+from arto.arto_addon.relight import many
 from arto.arto_addon.shot import paths, scene_id, status
 from arto.core.errors import BusyError, CaptureSetError, ShotError
 from scene_tools import captured, small_scene

@@ -7,7 +7,8 @@ import numpy as np
 import OpenImageIO
 import pytest
 from arto.arto_addon import work
-from arto.arto_addon.relight import plate, relight
+from arto.arto_addon.plate import plate
+from arto.arto_addon.relight import relight
 from arto.arto_addon.relight.many import relight_frames
 from arto.arto_addon.shot import paths
 from arto.core import exr

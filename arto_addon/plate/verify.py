@@ -17,8 +17,8 @@ from ..shot.shot import layer_of
 from ..stage.small import parts_of
 from ..stage.stage import stage
 from ..work import Progress, Steps
+from ..world.own import gains_of
 from . import plate
-from .own import gains_of
 
 # Samples of each of the two renders.
 SAMPLES = 16

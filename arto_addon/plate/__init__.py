@@ -1,0 +1,1 @@
+"""What is done with a relit picture: its files, its place in the compositor, and comparing it."""
