@@ -8,7 +8,7 @@ import bpy
 
 from ..core.field.field import Field
 from .capture.capture import capture
-from .fit import fit
+from .fit.fit import fit
 from .plate.present import present
 from .relight.relight import compute
 from .shot import paths

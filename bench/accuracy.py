@@ -17,8 +17,10 @@ from typing import Any
 import arto
 import bpy
 import numpy as np
-from arto.arto_addon import fit, work
-from arto.arto_addon.relight import denoise, relight
+from arto.arto_addon import work
+from arto.arto_addon.blender import denoise
+from arto.arto_addon.fit import fit
+from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import paths
 from arto.arto_addon.world.bake import bake
 from arto.core import exr, metrics

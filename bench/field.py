@@ -14,9 +14,10 @@ from typing import Any
 
 import bpy
 import numpy as np
-from arto.arto_addon import fit, work
+from arto.arto_addon import work
 from arto.arto_addon.blender.output import float_exr, write_to
 from arto.arto_addon.capture import capture
+from arto.arto_addon.fit import fit
 from arto.arto_addon.relight import relight
 from arto.core import exr, metrics
 from arto.core.capture.capture_set import CaptureSet

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from arto.arto_addon.relight import denoise
+from arto.arto_addon.blender import denoise
 from arto.arto_addon.world.bake import bake
 from arto.core import metrics
 from arto.core.light import lamps

@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from arto.arto_addon import fit, work
+from arto.arto_addon import work
 from arto.arto_addon.capture import capture
+from arto.arto_addon.fit import fit
 from arto.arto_addon.relight import relight
 from arto.arto_addon.world.bake import bake
 from arto.core.fit.choice import SEARCH

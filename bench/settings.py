@@ -17,11 +17,12 @@ from typing import Any
 
 import bpy
 import numpy as np
-from arto.arto_addon import fit, work
+from arto.arto_addon import work
 from arto.arto_addon.blender.colour import working_space
 from arto.arto_addon.blender.nodes import new_world
 from arto.arto_addon.blender.output import float_exr, write_to
 from arto.arto_addon.capture import capture
+from arto.arto_addon.fit import fit
 from arto.arto_addon.relight import relight
 from arto.core import exr
 from arto.core.capture.agreement import agreement

@@ -173,7 +173,7 @@ def capture_and_fit(size: Size, folder: Path) -> list[Row]:
 def relights(size: Size, folder: Path) -> list[Row]:
     """Relights of what was captured: each part, the whole, and a turntable."""
     from arto.arto_addon import work
-    from arto.arto_addon.relight import denoise
+    from arto.arto_addon.blender import denoise
     from arto.arto_addon.relight.many import relight_many
     from arto.arto_addon.relight.relight import compute
 

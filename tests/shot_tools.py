@@ -7,10 +7,11 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from arto.arto_addon import fit, work
+from arto.arto_addon import work
 from arto.arto_addon.blender.output import float_exr
 from arto.arto_addon.farm.job import Job
 from arto.arto_addon.farm.plan import plan
+from arto.arto_addon.fit import fit
 from arto.arto_addon.plate import plate
 from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import paths

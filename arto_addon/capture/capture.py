@@ -19,8 +19,8 @@ from ...core.fit.choice import check as check_choice
 from ...core.hemicube import Hemicube
 from ...core.patterns import pattern_set
 from ...core.region import Region
+from ..blender.denoise import cleaned
 from ..blender.output import write_to
-from ..relight.denoise import cleaned
 from ..shot import paths
 from ..shot.shot import shot_of
 from ..stage.stage import Stage, set_region

@@ -14,11 +14,11 @@ from ...core.field.field import proxy_folder
 from ...core.field.proxy import FACTORS
 from ...core.files import PART, Lock
 from ...core.fit.fit import fit_into
+from ..blender.denoise import cleaned
 from ..capture.beside import TAKES
 from ..capture.capture import check_file, plan_of
 from ..capture.resume import empty, finish, finish_field, let_go
 from ..capture.stream import Stream
-from ..relight.denoise import cleaned
 from ..shot import paths, scene_id
 from ..shot.shot import shot_of
 from ..work import Progress, Steps

@@ -25,7 +25,7 @@ from ...core.errors import ArtoError, CancelledError, SceneError
 from ..blender.compositing import places_of_groups
 from ..capture.capture import capture
 from ..capture.sequence import capture_frames
-from ..fit import fit
+from ..fit.fit import fit
 from ..plate.composite import save_composite
 from ..plate.verify import verify_plate
 from ..relight.looks import relight_looks

@@ -23,6 +23,7 @@ from ...core.light.layers import REST, by_faces, disc, part_of, residual, share_
 from ...core.light.light import PatchLight
 from ...core.relight import relights, together
 from ...core.shot import safe_name
+from ..blender import denoise
 from ..plate.plate import (
     comp_file,
     data_file,
@@ -39,7 +40,6 @@ from ..work import Progress, Steps
 from ..world import kept
 from ..world.lamp_render import lamp_light, lamp_samples
 from ..world.own import gains_of
-from . import denoise
 
 if TYPE_CHECKING:
     from .relight import Ready, Shown

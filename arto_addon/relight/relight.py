@@ -20,6 +20,7 @@ from ...core.light.lamps import Split, split
 from ...core.light.light import PatchLight
 from ...core.region import Region
 from ...core.relight import over, relights
+from ..blender import denoise
 from ..capture import beside
 from ..capture.plan import SAMPLED
 from ..plate import plate
@@ -34,7 +35,7 @@ from ..world.background import background, background_with_holes, holds_out, wit
 from ..world.check import check_world, differs_by_rays
 from ..world.lamp_render import brightness, lamp_light, lamp_samples, region_of
 from ..world.own import own_of
-from . import denoise, files, light_key
+from . import files, light_key
 
 # From this share of the light on the lamps are the picture, and what the field adds is denoised
 # with them: by themselves, beside darkness, they come out of the denoiser worse (docs/accuracy.md).

@@ -17,7 +17,7 @@ from ..capture.sequence import capture_frames
 from ..farm.gather import gather
 from ..farm.part import render_part, save_part
 from ..farm.plan import plan
-from ..fit import fit
+from ..fit.fit import fit
 from ..job import run as job
 from ..live import maps
 from ..relight.many import relight_frames, relight_many

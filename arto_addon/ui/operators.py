@@ -16,7 +16,7 @@ from ..capture.capture import capture
 from ..capture.check import check_scene
 from ..capture.planned import guess
 from ..capture.sequence import capture_frames
-from ..fit import fit
+from ..fit.fit import fit
 from ..job import session
 from ..relight.back import mix_to_scene
 from ..relight.many import frames_of, relight_frames

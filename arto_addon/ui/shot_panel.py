@@ -118,7 +118,7 @@ class Quality(Draws):
 
     @staticmethod
     def draw_column(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
-        from ..relight import denoise
+        from ..blender import denoise
 
         scene, settings = context.scene, context.scene.arto
         column.prop(settings, "quality", text="Capture")

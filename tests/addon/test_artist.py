@@ -5,9 +5,10 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import fit, shoot, work
+from arto.arto_addon import shoot, work
 from arto.arto_addon.blender.compositing import compositor
 from arto.arto_addon.capture import planes
+from arto.arto_addon.fit import fit
 from arto.arto_addon.plate import compare
 from arto.arto_addon.plate.composite import save_composite
 from arto.arto_addon.plate.present import present, use

@@ -12,9 +12,10 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import fit, work
+from arto.arto_addon import work
 from arto.arto_addon.blender.compositing import compositor, new_compositor
 from arto.arto_addon.blender.version import FIVE
+from arto.arto_addon.fit import fit
 from arto.arto_addon.plate import footage
 from arto.arto_addon.relight import relight
 from arto.arto_addon.relight.back import mix_of

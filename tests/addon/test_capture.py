@@ -9,8 +9,9 @@ import subprocess
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import fit, work
+from arto.arto_addon import work
 from arto.arto_addon.capture import capture, planned
+from arto.arto_addon.fit import fit
 from arto.arto_addon.shot import status
 from arto.arto_addon.stage.stage import picture_region
 from arto.core import exr

@@ -7,9 +7,10 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import fit, work
+from arto.arto_addon import work
 from arto.arto_addon.capture import capture, room
 from arto.arto_addon.capture.sequence import capture_frames
+from arto.arto_addon.fit import fit
 from arto.arto_addon.plate import plate
 from arto.arto_addon.plate.present import present_frames
 from arto.arto_addon.relight.many import relight_many

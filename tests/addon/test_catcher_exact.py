@@ -6,9 +6,10 @@ import bmesh
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import fit, work
+from arto.arto_addon import work
 from arto.arto_addon.blender.colour import working_space
 from arto.arto_addon.capture.beside import TAKES
+from arto.arto_addon.fit import fit
 from arto.arto_addon.plate import plate
 from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import paths

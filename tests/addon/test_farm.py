@@ -11,13 +11,14 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import fit, work
+from arto.arto_addon import work
 from arto.arto_addon.capture import planned
 from arto.arto_addon.capture.sequence import capture_frames
 from arto.arto_addon.farm import job as jobs
 from arto.arto_addon.farm import part as parts
 from arto.arto_addon.farm import templates
 from arto.arto_addon.farm.gather import gather
+from arto.arto_addon.fit import fit
 from arto.arto_addon.shot import paths
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import ArtoError, FarmError

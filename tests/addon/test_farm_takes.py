@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import fit, work
+from arto.arto_addon import work
 from arto.arto_addon.capture import planned, room
 from arto.arto_addon.capture.beside import TAKES
 from arto.arto_addon.capture.capture import capture
@@ -19,6 +19,7 @@ from arto.arto_addon.farm import gather as gathering
 from arto.arto_addon.farm import part as parts
 from arto.arto_addon.farm import templates
 from arto.arto_addon.farm.gather import gather
+from arto.arto_addon.fit import fit
 from arto.arto_addon.plate import plate
 from arto.arto_addon.shot import paths
 from arto.core import exr

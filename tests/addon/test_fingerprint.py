@@ -7,7 +7,8 @@ import time
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import fit, work
+from arto.arto_addon import work
+from arto.arto_addon.fit import fit
 from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import status
 from arto.arto_addon.shot.fingerprint import changes, fingerprint

@@ -5,10 +5,11 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import fit, work
+from arto.arto_addon import work
 from arto.arto_addon.blender.nodes import new_material
 from arto.arto_addon.capture import planes
 from arto.arto_addon.capture.light_check import check_light
+from arto.arto_addon.fit import fit
 from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import status
 from arto.arto_addon.stage.bounds import scene_bounds

@@ -8,7 +8,8 @@ from itertools import pairwise
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import fit, shoot, work
+from arto.arto_addon import shoot, work
+from arto.arto_addon.fit import fit
 from arto.arto_addon.live import live, maps
 from arto.arto_addon.live.viewer import Viewer, Wish
 from arto.arto_addon.relight.light_key import HEADER, light_key

@@ -7,9 +7,10 @@ import math
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import fit, work
+from arto.arto_addon import work
 from arto.arto_addon.blender.compositing import OUTPUT, compositor
 from arto.arto_addon.capture.sequence import capture_frames
+from arto.arto_addon.fit import fit
 from arto.arto_addon.relight import many, relight
 from arto.arto_addon.shot import paths
 from arto.arto_addon.world import bake as bake_module

@@ -9,8 +9,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import fit, work
+from arto.arto_addon import work
 from arto.arto_addon.blender.nodes import new_world
+from arto.arto_addon.fit import fit
 from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import scene_id
 from arto.core import exr

@@ -7,9 +7,10 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import fit, work
+from arto.arto_addon import work
 from arto.arto_addon.blender.output import set_format, write_to
 from arto.arto_addon.blender.version import FIVE
+from arto.arto_addon.fit import fit
 from arto.arto_addon.relight import relight
 from arto.arto_addon.stage.settings import prepare
 from arto.arto_addon.stage.stage import stage

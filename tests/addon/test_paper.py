@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from arto.arto_addon import fit, work
+from arto.arto_addon import work
+from arto.arto_addon.fit import fit
 from arto.arto_addon.relight import relight
 from arto.core import exr
 from arto.core.errors import PatternError

@@ -7,10 +7,12 @@ import math
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon import fit, work
+from arto.arto_addon import work
+from arto.arto_addon.blender import denoise
 from arto.arto_addon.blender.compositing import add_output, compositor, new_compositor
+from arto.arto_addon.fit import fit
 from arto.arto_addon.plate import plate
-from arto.arto_addon.relight import denoise, relight
+from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import paths
 from arto.arto_addon.world.bake import bake
 from arto.core import exr

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import bpy
 import pytest
-from arto.arto_addon import fit, work
+from arto.arto_addon import work
 from arto.arto_addon.capture import capture
+from arto.arto_addon.fit import fit
 from arto.arto_addon.plate import plate
 from arto.arto_addon.plate.verify import verify_file
 from arto.arto_addon.relight import many

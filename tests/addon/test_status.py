@@ -8,7 +8,8 @@ import re
 import time
 
 import bpy
-from arto.arto_addon import fit, work
+from arto.arto_addon import work
+from arto.arto_addon.fit import fit
 from arto.arto_addon.shot import paths, status
 from scene_tools import captured, small_scene
 

@@ -6,8 +6,9 @@ import threading
 
 import numpy as np
 import pytest
-from arto.arto_addon import fit, work
+from arto.arto_addon import work
 from arto.arto_addon.capture import capture, planned, room
+from arto.arto_addon.fit import fit
 from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import paths
 from arto.core.capture.capture_set import CaptureSet

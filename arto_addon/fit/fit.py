@@ -6,16 +6,16 @@ from pathlib import Path
 
 import bpy
 
-from ..core.capture.capture_set import CaptureSet
-from ..core.errors import CaptureSetError, FieldError
-from ..core.field.field import Field
-from ..core.files import Lock
-from ..core.fit.fit import fit as fit_captured
-from .capture import beside
-from .relight.denoise import cleaned
-from .shot import paths, status
-from .shot.shot import check_same_shot, layer_of, shot_of
-from .work import Progress, Steps
+from ...core.capture.capture_set import CaptureSet
+from ...core.errors import CaptureSetError, FieldError
+from ...core.field.field import Field
+from ...core.files import Lock
+from ...core.fit.fit import fit as fit_captured
+from ..blender.denoise import cleaned
+from ..capture import beside
+from ..shot import paths, status
+from ..shot.shot import check_same_shot, layer_of, shot_of
+from ..work import Progress, Steps
 
 
 def _is_fitted(captured: CaptureSet, folder: Path, choice: str, separate: bool) -> bool:

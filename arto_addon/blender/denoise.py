@@ -17,10 +17,10 @@ from ...core import exr
 from ...core.field.field import Field
 from ...core.field.tile_writer import write_layer
 from ...core.field.writer import write_head
-from ..blender.colour import working_space
-from ..blender.compositing import choose, studio
 from ..plate.plate import mixed
 from ..work import Progress, Steps
+from .colour import working_space
+from .compositing import choose, studio
 
 _available: list[bool] = []
 

@@ -1,0 +1,1 @@
+"""Fitting what was captured of a shot, and the guides that its field carries (paper 5)."""
