@@ -166,7 +166,7 @@ def _settings(options: argparse.Namespace) -> None:
 
 
 def _changes(options: argparse.Namespace) -> None:
-    from arto.arto_addon.stage.settings import page
+    from .changes import page
 
     if options.page:
         options.page.write_text(page(), encoding="utf-8")

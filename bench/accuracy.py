@@ -20,6 +20,7 @@ import numpy as np
 from arto.arto_addon import work
 from arto.arto_addon.blender import denoise
 from arto.arto_addon.fit import fit
+from arto.arto_addon.fit.guides import guides_of
 from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import paths
 from arto.arto_addon.world.bake import bake
@@ -100,7 +101,7 @@ class Shot:
         scene = self.scene()
         work.run(fit.fit(scene))
         self.fields = {ARTO: Field(paths.field_folder(scene))}
-        self.guides = denoise.guides_of(self.fields[ARTO])
+        self.guides = guides_of(self.fields[ARTO])
 
     def fit_baselines(self, choices: Iterable[str]) -> None:
         """Fit every other method's field, of captures of the same samples."""

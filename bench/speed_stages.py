@@ -174,6 +174,8 @@ def relights(size: Size, folder: Path) -> list[Row]:
     """Relights of what was captured: each part, the whole, and a turntable."""
     from arto.arto_addon import work
     from arto.arto_addon.blender import denoise
+    from arto.arto_addon.fit.guides import clean as is_clean
+    from arto.arto_addon.fit.guides import guides_of
     from arto.arto_addon.relight.many import relight_many
     from arto.arto_addon.relight.relight import compute
 
@@ -181,8 +183,8 @@ def relights(size: Size, folder: Path) -> list[Row]:
     layer = scene.view_layers[0].name
     field = Field(Path((folder / "field.txt").read_text()))
     rows = sums(field)
-    guides, picture = denoise.guides_of(field), field.layer("own") + 1
-    clean = denoise.clean(field)
+    guides, picture = guides_of(field), field.layer("own") + 1
+    clean = is_clean(field)
     once = timed(lambda: denoise.denoise(guides, picture, clean=clean, like=scene), 2)[0]
     scene.arto.lamps = False
     first, _ = timed(lambda: work.run(compute(scene)))

@@ -68,6 +68,20 @@ def add_output(tree: Any) -> Any:
     return tree.nodes.new(OUTPUT)
 
 
+def mixed(tree: Any, how: str, one: Any, other: Any) -> Any:
+    """The sum or product of two colours in a compositor tree, a socket."""
+    node = tree.nodes.new("ShaderNodeMix")
+    node.data_type, node.blend_type, node.clamp_factor = "RGBA", how, False
+    sockets = [s for s in node.inputs if s.enabled]
+    sockets[0].default_value = 1.0
+    for socket in sockets[1:]:
+        # what is shown of a layer that is gone
+        socket.default_value = (0, 0, 0, 1)
+    tree.links.new(one, sockets[1])
+    tree.links.new(other, sockets[2])
+    return next(s for s in node.outputs if s.enabled)
+
+
 def places_of_groups() -> Iterator[Any]:
     """Every tree that may have a compositor's node group in it."""
     yield from bpy.data.node_groups

@@ -6,7 +6,6 @@ word. So a picture of known noise is denoised once, and what cannot denoise says
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -14,13 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core import exr
-from ...core.field.field import Field
-from ...core.field.tile_writer import write_layer
-from ...core.field.writer import write_head
-from ..plate.plate import mixed
-from ..work import Progress, Steps
 from .colour import working_space
-from .compositing import choose, studio
+from .compositing import choose, mixed, studio
 
 _available: list[bool] = []
 
@@ -42,46 +36,6 @@ def available() -> bool:
         noisy = rng.exponential(size=(64, 64, 3)).astype(np.float32)
         _available.append(bool(denoise({}, noisy).std() < 0.5 * noisy.std()))
     return _available[0]
-
-
-# From so many samples of a capture on, what is left of noise in its guides does no harm
-# (docs/accuracy.md).
-CLEAN_SAMPLES = 64
-
-
-def guides_of(field: Field) -> dict[str, NDArray]:
-    """The guides that a field carries, by name."""
-    names = ("albedo", "normal")
-    return {n: field.layer(n) for n in names if field.has_layer(n)}
-
-
-def clean(field: Field) -> bool:
-    """Whether a field's guides have next to no noise."""
-    about = field.about
-    return about.get("guides") == CLEAN or about.get("samples", 0) >= CLEAN_SAMPLES
-
-
-# What a field says of guides that were denoised when it was written.
-CLEAN = "clean"
-
-
-def cleaned(scene: bpy.types.Scene, folder: Path) -> Steps:
-    """Denoise the guides of a new field, so that no relight has to, where the scene's relights are
-    denoised at all."""
-    field = Field(folder)
-    guides = guides_of(field)
-    if not scene.arto.denoise or clean(field) or not guides or not available():
-        return
-    yield Progress(0.99, "denoising the guides")
-    for name, pixels in guides.items():
-        # a normal is from -1 to 1, and a denoiser of pictures knows nothing below 0
-        low, span = (-1.0, 2.0) if name == "normal" else (0.0, 1.0)
-        noisy = ((pixels - low) / span).astype(np.float32)
-        better = denoise({}, noisy, like=scene) * span + low
-        for tile in field.tiles:
-            write_layer(tile.folder, name, better[tile.region.slices])
-    field.head["about"]["guides"] = CLEAN
-    write_head(folder, field.head)
 
 
 # Of a scene's render settings, those of the compositor's denoiser.

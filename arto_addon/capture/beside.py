@@ -10,13 +10,8 @@ from typing import Any
 from ...core.capture.capture_set import CaptureSet
 from ...core.errors import ArtoError
 from ...core.hemicube import Hemicube
-from ..stage.takes import GROUND, THINGS
+from ..stage.takes import PAIR
 from .planned import Given
-
-# Their names, which are those of their folders in the shot's, in the order of capturing.
-TAKES = (GROUND, THINGS)
-# In a description: the key of the first take.
-PAIR = "pair"
 
 
 def given_by(head: dict[str, Any]) -> Given:

@@ -19,10 +19,11 @@ from ...core.fit.choice import check as check_choice
 from ...core.hemicube import Hemicube
 from ...core.patterns import pattern_set
 from ...core.region import Region
-from ..blender.denoise import cleaned
 from ..blender.output import write_to
+from ..fit.guides import cleaned
 from ..shot import paths
 from ..shot.shot import shot_of
+from ..stage import takes
 from ..stage.stage import Stage, set_region
 from ..work import Progress, Render, Steps
 from . import beside, planes
@@ -86,23 +87,23 @@ def _capture(
         head = unfinished(folder, this.key)
         stopped = head is not None
         if head is None or only_estimate:
-            count = 1 + len(beside.TAKES) * this.catchers
+            count = 1 + len(takes.TAKES) * this.catchers
             plan, head = yield from begun(this, folder, given, takes=count)
             if only_estimate:
                 return plan.estimate
             empty(folder)
         yield from _render_tiles(this.on, folder, head)
-    takes = [(folder, claimed, head)]
-    for name in beside.TAKES if this.catchers else ():
+    made = [(folder, claimed, head)]
+    for name in takes.TAKES if this.catchers else ():
         steps = _capture_beside(scene, view_layer, claimed / name, name, head, stopped)
         found = yield from steps
-        takes += [found] if found else []
+        made += [found] if found else []
     # all at the end, so that an earlier capture stays whole until then; the first one last, by
     # which an interrupted end is gone on with
-    for each in reversed(takes):
+    for each in reversed(made):
         yield from _finish(scene, *each)
     if not this.catchers:
-        for name in beside.TAKES:
+        for name in takes.TAKES:
             empty(claimed / name)
     paths.forget()
     caution = f". CAUTION: {head['caution']['text']}" if head.get("caution") else ""
@@ -131,7 +132,7 @@ def _capture_beside(
         if head is None:
             _, head = yield from begun(this, folder, given, len(first["tiles"]))
             empty(folder)
-        head[beside.PAIR] = first["key"]
+        head[takes.PAIR] = first["key"]
         yield from _render_tiles(this.on, folder, head)
     return folder, place, head
 

@@ -16,6 +16,7 @@ from ...core.fit.choice import check as check_choice
 from ...core.hemicube import Hemicube
 from ...core.patterns import pattern_set
 from ...core.region import Region
+from ...core.units import size
 from ..stage.settings import samples_of
 from ..stage.stage import Stage, picture_region
 from ..work import Progress, Steps
@@ -138,5 +139,5 @@ def guess(scene: bpy.types.Scene, short: bool = False) -> str:
     except ArtoError as e:
         return str(e)
     if short:
-        return f"up to {room.size(found.memory)} memory, {room.size(found.disk)} disk"
+        return f"up to {size(found.memory)} memory, {size(found.disk)} disk"
     return f"up to {found.line}"

@@ -11,7 +11,7 @@ from typing import Any
 
 from ...core.errors import SceneError
 from ...core.region import Region
-from ..job.task import clock
+from ...core.units import clock, size
 
 # Of the machine's memory, what the chain may take where the artist does not say: Blender, the scene
 # and the rest of the machine have the others.
@@ -101,11 +101,6 @@ class Estimate:
             f"{time}{size(self.disk)} of disk while it runs, keeps {size(self.kept)}, "
             f"{size(self.memory)} of memory"
         )
-
-
-def size(number: float) -> str:
-    """Bytes in few words: `3.9 GB`."""
-    return f"{number / 1e9:.1f} GB" if number >= 1e9 else f"{number / 1e6:.0f} MB"
 
 
 def estimate(

@@ -14,13 +14,13 @@ from ...core.field.field import proxy_folder
 from ...core.field.proxy import FACTORS
 from ...core.files import PART, Lock
 from ...core.fit.fit import fit_into
-from ..blender.denoise import cleaned
-from ..capture.beside import TAKES
 from ..capture.capture import check_file, plan_of
 from ..capture.resume import empty, finish, finish_field, let_go
 from ..capture.stream import Stream
+from ..fit.guides import cleaned
 from ..shot import paths, scene_id
 from ..shot.shot import shot_of
+from ..stage.takes import TAKES
 from ..work import Progress, Steps
 from .job import Job, Part
 

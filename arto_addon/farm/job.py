@@ -23,13 +23,12 @@ from ...core.errors import FarmError
 from ...core.files import write_text
 from ...core.region import Region
 from ..capture import room
-from ..capture.beside import TAKES
 from ..capture.capture import plan_of
 from ..capture.room import Estimate
 from ..capture.sequence import frame_kept
 from ..shot import home
 from ..stage.settings import samples_told
-from ..stage.takes import WHOLE
+from ..stage.takes import TAKES, WHOLE
 
 # Version 1 knows no takes beside the first, and so has none.
 VERSION = 2

@@ -14,14 +14,15 @@ from ...core.capture.capture_set import write_header
 from ...core.errors import FarmError
 from ...core.fit.choice import check as check_choice
 from ...core.patterns import pattern_set
+from ...core.units import size
 from ..capture import room
 from ..capture.asked import asked, begun
-from ..capture.beside import PAIR, TAKES, given_by
+from ..capture.beside import given_by
 from ..capture.check import check_scene
 from ..capture.planned import Given
 from ..capture.sequence import frame_kept, together
 from ..shot import home
-from ..stage.takes import WHOLE
+from ..stage.takes import PAIR, TAKES, WHOLE
 from ..work import Progress, Steps
 from . import job, templates
 
@@ -88,7 +89,7 @@ def plan(
     yield Progress(
         1.0,
         f"planned {len(made.parts)} parts: {len(frames)} frames{takes}, {tiles} tiles, {seeds} "
-        f"seeds; {room.size(needed)} of disk until they are gathered{told}",
+        f"seeds; {size(needed)} of disk until they are gathered{told}",
     )
     return folder
 
@@ -138,7 +139,7 @@ def _check_disk(folder: Path, needed: int) -> None:
     free = shutil.disk_usage(folder).free
     if free < needed * (1 + room.SPARE):
         raise FarmError(
-            f"the parts of this job need {room.size(needed)} of disk, and {folder} has "
-            f"{room.size(free)} free: make room, or plan into another folder, or fewer frames or "
+            f"the parts of this job need {size(needed)} of disk, and {folder} has "
+            f"{size(free)} free: make room, or plan into another folder, or fewer frames or "
             "seeds"
         )

@@ -11,10 +11,10 @@ from ...core.errors import CaptureSetError, FieldError
 from ...core.field.field import Field
 from ...core.files import Lock
 from ...core.fit.fit import fit as fit_captured
-from ..blender.denoise import cleaned
-from ..capture import beside
+from ..fit.guides import cleaned
 from ..shot import paths, status
 from ..shot.shot import check_same_shot, layer_of, shot_of
+from ..stage import takes
 from ..work import Progress, Steps
 
 
@@ -71,7 +71,7 @@ def fit(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     with Lock(target.parent, f"fitting {shot_of(scene, layer).title}"):
         if captured.head.get("catchers"):
             # first, so that no field of everything is there without those beside it
-            for name in beside.TAKES:
+            for name in takes.TAKES:
                 there = CaptureSet(folder.parent / name / "capture")
                 yield from _fit_one(scene, there, target.parent / name / "field")
         yield from _fit_one(scene, captured, target)

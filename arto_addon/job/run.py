@@ -22,6 +22,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import ArtoError, CancelledError, SceneError
+from ..blender import devices
 from ..blender.compositing import places_of_groups
 from ..capture.capture import capture
 from ..capture.sequence import capture_frames
@@ -76,7 +77,7 @@ def _steps(task: Task, folder: Path) -> Any:
     scene = bpy.data.scenes.get(task.scene)
     if scene is None:
         raise SceneError(f"there is no scene '{task.scene}'")
-    _use_devices(task.devices)
+    devices.use(task.devices)
     _turn_paths(folder)
     for painted in task.painted:
         image = bpy.data.images.get(
@@ -100,17 +101,6 @@ def _steps(task: Task, folder: Path) -> Any:
         "composite": save_composite,
     }[task.verb]
     return work(scene, task.view_layer)
-
-
-def _use_devices(devices: dict[str, Any]) -> None:
-    """Render with what the artist renders with."""
-    addon = bpy.context.preferences.addons.get("cycles")
-    if addon is None or not devices:
-        return
-    addon.preferences.compute_device_type = devices["kind"]
-    for device in addon.preferences.devices:
-        if device.id in devices["use"]:
-            device.use = devices["use"][device.id]
 
 
 def _turn_paths(folder: Path) -> None:

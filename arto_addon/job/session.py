@@ -22,12 +22,13 @@ from bpy.app.handlers import persistent
 
 from ...core.errors import BusyError, SceneError
 from ...core.files import Lock
+from ...core.units import clock
 from ..blender.quitting import not_when_quitting, when_quitting
 from ..shot import paths, watch
 from ..shot.shot import shot_of
 from . import snapshot
 from .run import CANCEL, PATIENCE
-from .task import State, clock
+from .task import State
 
 # How often the window looks how far the job is.
 EVERY = 0.2

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
 
 from ...core.errors import SceneError
+from ..blender import devices
 from .task import Painted, Task
 
 # Not empty while a snapshot is saved: for who does something before a file of the artist's is.
@@ -40,7 +40,7 @@ def take(folder: Path, verb: str, scene: bpy.types.Scene, view_layer: str) -> tu
         )
         painted = tuple(_painted(image, folder) for image in bpy.data.images if in_no_file(image))
         _link_caches(folder)
-        task = Task(verb, scene.name, view_layer, bpy.data.filepath, _devices(), painted)
+        task = Task(verb, scene.name, view_layer, bpy.data.filepath, devices.chosen(), painted)
         return blend, task.write(folder)
     except (OSError, RuntimeError) as e:
         raise SceneError(
@@ -92,15 +92,3 @@ def _link_caches(folder: Path) -> None:
         _winapi.CreateJunction(str(caches), str(folder / caches.name))
     else:
         (folder / caches.name).symlink_to(caches, target_is_directory=True)
-
-
-def _devices() -> dict[str, Any]:
-    """The artist's render devices, also where the preferences were not saved."""
-    addon = bpy.context.preferences.addons.get("cycles")
-    if addon is None:
-        return {}
-    chosen = addon.preferences
-    return {
-        "kind": chosen.compute_device_type,
-        "use": {device.id: bool(device.use) for device in chosen.devices},
-    }

@@ -85,13 +85,3 @@ class State:
             return State(**json.loads((folder / PROGRESS).read_text(encoding="utf-8")))
         except (OSError, ValueError, TypeError):
             return State()
-
-
-def clock(seconds: float) -> str:
-    """A time in few words: `45 s`, `3 min 20 s`, `2 h 5 min`."""
-    seconds = round(seconds)
-    if seconds < 60:
-        return f"{seconds} s"
-    if seconds < 3600:
-        return f"{seconds // 60} min {seconds % 60} s"
-    return f"{seconds // 3600} h {seconds % 3600 // 60} min"

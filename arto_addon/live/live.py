@@ -27,14 +27,13 @@ from ..blender.quitting import not_when_quitting, when_quitting
 from ..job import session
 from ..plate.plate import name_of
 from ..relight.light_key import HEADER, light_key
-from ..relight.relight import Shown
+from ..relight.shown import Shown
 from ..shot import paths, watch
 from ..shot.shot import check_same_shot, layer_of
 from ..stage.stage import picture_size
 from ..world.background import holds_out
 from ..world.check import check_world, world_of
 from ..world.kept import shows
-from ..world.lamp_render import region_of
 from ..world.own import gains_of
 from . import maps
 from .viewer import Viewer, Wish
@@ -65,7 +64,7 @@ class Live:
         self.maps = maps.Maps()
         self.shape = shown.field.shape
         # outside a render region a picture is empty
-        self.region = region_of(shown.field)
+        self.region = shown.field.region
         self._shot = self._place(scene)
         # what only the finished picture has
         self.later = "its brightness" if shown.held else ""

@@ -12,8 +12,8 @@ from typing import Any
 import bpy
 
 from ...core import exr
-from ..blender.compositing import choose, places_of_groups
-from .plate import add_footage, mixed, show
+from ..blender.compositing import choose, mixed, places_of_groups
+from .plate import add_footage, show
 
 EXPOSURE_SOCKET = "Exposure"
 SOURCE, ALPHA, EXPOSURE = "ARTO Layers", "ARTO Alpha", "ARTO Exposure"

@@ -15,6 +15,7 @@ from ...core.errors import SceneError
 from ...core.exr.window import NO_HIT, Window
 from ...core.field.field import Field
 from ..blender.colour import working_space
+from ..blender.compositing import mixed
 from ..shot import home, paths
 from .header import header
 
@@ -205,17 +206,3 @@ def add_footage(tree: Any, things: Any, share: bpy.types.Image) -> None:
     out = next(n for n in tree.nodes if n.bl_idname == "NodeGroupOutput")
     tree.links.new(whole, out.inputs["Composite"])
     tree.links.new(shown.outputs["Image"], out.inputs["Shadow Catcher"])
-
-
-def mixed(tree: Any, how: str, one: Any, other: Any) -> Any:
-    """The sum or product of two colours in a compositor tree, a socket."""
-    node = tree.nodes.new("ShaderNodeMix")
-    node.data_type, node.blend_type, node.clamp_factor = "RGBA", how, False
-    sockets = [s for s in node.inputs if s.enabled]
-    sockets[0].default_value = 1.0
-    for socket in sockets[1:]:
-        # what is shown of a layer that is gone
-        socket.default_value = (0, 0, 0, 1)
-    tree.links.new(one, sockets[1])
-    tree.links.new(other, sockets[2])
-    return next(s for s in node.outputs if s.enabled)

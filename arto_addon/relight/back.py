@@ -24,7 +24,7 @@ from ..shot.shot import layer_of
 from ..world import kept
 from ..world.check import check_world
 from . import layers
-from .relight import Shown
+from .shown import Shown
 
 WORLD = "ARTO Mix"
 

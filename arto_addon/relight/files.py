@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +13,7 @@ from ...core.catcher import Caught
 from ..plate import plate
 from ..work import Progress, Steps
 from . import layers
-
-if TYPE_CHECKING:
-    from .relight import Ready, Shown
+from .shown import Ready, Shown
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from ..world import kept
 from ..world.check import check_world
 from ..world.own import own_of
 from .layers import parts_of
-from .relight import Shown
+from .shown import Shown
 
 IMAGE, FROM = "ARTO Inside", "ARTO Light From"
 SIDE = 192

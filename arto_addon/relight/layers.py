@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import bpy
 import numpy as np
@@ -40,9 +40,7 @@ from ..work import Progress, Steps
 from ..world import kept
 from ..world.lamp_render import lamp_light, lamp_samples
 from ..world.own import gains_of
-
-if TYPE_CHECKING:
-    from .relight import Ready, Shown
+from .shown import Ready, Shown
 
 # The layers of no part of the world's light: the scene's own lamps, and the world that is seen.
 OWN, BEHIND = "own", "behind"

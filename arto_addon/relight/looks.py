@@ -14,7 +14,8 @@ from ..shot import paths
 from ..shot.shot import check_same_shot, layer_of
 from ..work import Progress, Steps
 from ..world.check import world_of
-from .relight import Light, Ready, Shown, finish, make_ready
+from .relight import finish, make_ready
+from .shown import Light, Ready, Shown
 
 
 def add(scene: bpy.types.Scene, name: str = "") -> Any:

@@ -21,7 +21,8 @@ from ..shot import paths
 from ..shot.shot import check_same_shot, shot_of
 from ..work import Progress, Steps
 from ..world.check import check_world
-from .relight import Light, Ready, Shown, finish, make_ready
+from .relight import finish, make_ready
+from .shown import Light, Ready, Shown
 
 
 def relight_many(

@@ -3,39 +3,30 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from pathlib import Path
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.catcher import catch_seen, held_out, of_ground
-from ...core.errors import FieldError
-from ...core.field.field import Field
+from ...core.catcher import catch_seen, of_ground
 from ...core.light.environment import Environment
-from ...core.light.lamps import Split, split
+from ...core.light.lamps import Split
 from ...core.light.light import PatchLight
 from ...core.region import Region
-from ...core.relight import over, relights
+from ...core.relight import over
 from ..blender import denoise
-from ..capture import beside
-from ..capture.plan import SAMPLED
 from ..plate import plate
-from ..plate.footage import footage
 from ..plate.present import present
 from ..shot import paths
 from ..shot.shot import check_same_shot, layer_of
-from ..shot.status import changed_since
 from ..work import Progress, Steps
 from ..world import kept
 from ..world.background import background, background_with_holes, holds_out, without_holes
 from ..world.check import check_world, differs_by_rays
-from ..world.lamp_render import brightness, lamp_light, lamp_samples, region_of
+from ..world.lamp_render import brightness, lamp_light, lamp_samples
 from ..world.own import own_of
 from . import files, light_key
+from .shown import Laps, Light, Ready, Shown
 
 # From this share of the light on the lamps are the picture, and what the field adds is denoised
 # with them: by themselves, beside darkness, they come out of the denoiser worse (docs/accuracy.md).
@@ -44,108 +35,6 @@ NEARLY_ALL = 0.9
 OPAQUE = 1 - 1e-5
 # A lamp of more than this share of the light is looked for behind the plate by every pixel.
 LEAST_SHARE = 1e-3
-
-
-@dataclass(frozen=True)
-class Light:
-    """A light to show a shot in. world: None for the view layer's own; path: of the picture;
-    look: what it is called in the picture's header."""
-
-    path: Path
-    look: str = ""
-    world: bpy.types.World | None = None
-
-
-class Shown:
-    """A shot's field, opened: what all the lights that it is shown in have in common.
-
-    Raises SceneError, CaptureSetError (of another shot), ShotError (another's), FieldError.
-    """
-
-    def __init__(self, scene: bpy.types.Scene, view_layer: str, folder: Path | None = None) -> None:
-        self.scene, self.layer = scene, view_layer
-        if folder is None:
-            folder = paths.field_folder(scene, view_layer)
-            if not folder.exists() and not paths.capture_folder(scene, view_layer).exists():
-                near = paths.nearest(scene, view_layer)
-                check_same_shot(scene, near, "the reflectance field", view_layer)
-        self.field = Field(folder)
-        self._changed: dict[tuple[int, float], list[str]] = {}
-        self._split: tuple[NDArray[np.float32], Split] | None = None
-        self._filmed: tuple[tuple[int, float], tuple[str, NDArray[np.float32]]] | None = None
-        self.held = self.field.about.get("route") == SAMPLED
-        # of a shot with shadow catchers: of everything, of the catchers, of the things
-        self.takes = [self]
-        if self.field.about.get("catchers") and not self.field.about.get("take"):
-            self.takes += [self._beside(folder.parent / name / "field") for name in beside.TAKES]
-
-    def _beside(self, folder: Path) -> Shown:
-        """Another take of the shot. Raises FieldError."""
-        found = Shown(self.scene, self.layer, folder)
-        if found.field.about.get(beside.PAIR) != self.field.about.get("key"):
-            raise FieldError(
-                f"what is in {folder} was captured for another picture: run Capture again, it goes "
-                "on where it stopped"
-            )
-        return found
-
-    def pictures(self, lights: Sequence[PatchLight]) -> list[list[NDArray[np.float32]]]:
-        """For each light what each take's field shows in it, (H, W, 4)."""
-        # the first two are divided by each other
-        cut = [len(self.takes) > 1 and take is not self.takes[-1] for take in self.takes]
-        found = [
-            relights(t.field, lights, 0.0, cut=c) for t, c in zip(self.takes, cut, strict=True)
-        ]
-        return [list(each) for each in zip(*found, strict=True)]
-
-    def changed(self) -> list[str]:
-        """What of the scene is not as it was captured, at its frame."""
-        frame = self.scene.frame_current, self.scene.frame_subframe
-        if frame not in self._changed:
-            found = changed_since(self.scene, self.layer, self.field.about, now=True)
-            self._changed = {frame: found}
-        return self._changed[frame]
-
-    def filmed(self) -> tuple[str, NDArray[np.float32]] | None:
-        """The name and the picture of the footage that the things of a shot with shadow catchers
-        are put into, at its frame; read once for all lights. Raises SceneError."""
-        found = footage(self.scene) if len(self.takes) > 1 else None
-        if found is None:
-            return None
-        key = self.scene.frame_current, self.scene.frame_subframe
-        if self._filmed is None or self._filmed[0] != key:
-            self._filmed = key, (found.name, found.read(self.scene))
-        return self._filmed[1]
-
-    def split(self, whole: Environment) -> Split:
-        """The lamps cut out of a light. Where patches are all around, a turned map is cut as it was
-        before."""
-        if not self.field.hemicube.closed:
-            return split(whole, self.field.hemicube)
-        if self._split is None or self._split[0] is not whole.image:
-            self._split = whole.image, split(whole)
-        found = self._split[1]
-        rest, lamps = (replace(part, turn=whole.turn) for part in (found.rest, found.lamps))
-        return Split(rest, lamps, found.share)
-
-    def held_out(self, *alphas: NDArray[np.float32]) -> NDArray[np.float32] | float:
-        """How much of each pixel is cut out before the ground, from its takes' alphas, (H, W)."""
-        return held_out(*alphas) if holds_out(self.scene, self.layer) else 0.0
-
-    @cached_property
-    def guides(self) -> dict[str, NDArray]:
-        return denoise.guides_of(self.field)
-
-    def denoised(self, *parts: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The sum of pictures of what the field shows, (H, W, 3), each denoised by itself."""
-        clean = denoise.clean(self.field)
-        found = denoise.denoise(self.guides, *parts, clean=clean, like=self.scene)
-        # a denoiser lets outlines glow into what is empty, and footage is seen through that
-        nothing = self.field.layer("alpha") == 0
-        for part in parts:
-            nothing &= ~part.any(axis=-1)
-        found[nothing] = 0
-        return found
 
 
 def relight(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
@@ -173,46 +62,6 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     check_same_shot(scene, shown.field.about.get("shot"), "the reflectance field", layer)
     seconds = yield from show(shown, Light(path, scene.arto.look))
     return path, seconds
-
-
-@dataclass
-class Ready:
-    """A light, made ready to be shown in: its lamps are rendered, its bins are full.
-
-    whole: its environment; found: that without lamps, and these; rendered: for each take, pictures
-    of the lamps, none or one; lamps: what was done with them, in words; together: whether they have
-    nearly all light.
-    """
-
-    lit: Light
-    world: bpy.types.World
-    whole: Environment
-    found: Split
-    rendered: list[list[NDArray[np.float32]]]
-    lamps: str
-    together: bool
-    light: PatchLight
-    changed: list[str]
-    by_rays: str
-    below: str
-    laps: Laps
-
-
-class Laps:
-    """Seconds by part."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self.go_on()
-
-    def go_on(self) -> None:
-        """Count from now."""
-        self._last = time.perf_counter()
-
-    def lap(self, name: str) -> None:
-        now = time.perf_counter()
-        self.seconds[name] = now - self._last
-        self._last = now
 
 
 def show(shown: Shown, lit: Light) -> Steps:
@@ -352,7 +201,7 @@ def _hold(
 ) -> Steps:
     """Hold a picture to the brightness that a small render of its light has: of light that only
     shadow rays bring, Cycles lets hang on the whole world how much of it there is."""
-    region = region_of(shown.field).slices
+    region = shown.field.region.slices
     expected = yield from brightness(shown.scene, shown.field, whole, 0.65)
     for rendered in parts:  # the lamps' light, which is Cycles' already
         expected = np.maximum(expected - rendered[region].mean(axis=(0, 1)), 0)
@@ -363,7 +212,7 @@ def _hold(
 def _behind(shown: Shown, lit: Light, picture: NDArray[np.float32], has_lamps: bool) -> None:
     """Add the world as the camera sees it behind everything."""
     scene, layer = shown.scene, shown.layer
-    captured = region_of(shown.field)
+    captured = shown.field.region
     if holds_out(scene, layer):
         if len(shown.takes) > 1:
             # what is behind is seen through the shadows, and in the holes not at all

@@ -6,8 +6,8 @@ import bpy
 
 from ...core.errors import ArtoError
 from ...core.hemicube import SIDES
+from ...core.units import size
 from ..capture import planes
-from ..capture.room import size
 from ..shot import paths, status
 from ..shot.shot import layer_of
 from . import properties

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
+from ...core.units import clock
 from ..job import session
 from ..job.session import Job
-from ..job.task import clock
 from ..shot import status
 from ..stage.settings import looks_otherwise, samples_of
 from ..stage.stage import picture_size

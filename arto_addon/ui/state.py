@@ -13,9 +13,8 @@ from ...core.capture import capture_set
 from ...core.errors import ArtoError
 from ...core.field import field
 from ...core.shot import Shot
+from ...core.units import clock, size
 from ..capture.planned import most
-from ..capture.room import size
-from ..job.task import clock
 from ..shot import paths, status
 from ..shot.shot import layer_of, shot_of
 from ..stage.settings import samples_of

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from ...core.errors import SceneError
 from ...core.field.field import Field
 from ...core.light.environment import Environment
-from ...core.region import Region
 from ..blender.colour import working_space
 from ..blender.nodes import new_world
 from ..stage.bounds import rendered
@@ -68,14 +67,6 @@ def lamp_samples(scene: bpy.types.Scene, share: float) -> int:
     return max(LEAST_SAMPLES, math.ceil(scene.arto.lamp_samples * share))
 
 
-def region_of(field: Field) -> Region:
-    """The rectangle around all tiles of a field."""
-    tiles = [t.region for t in field.tiles]
-    x, y = min(t.x for t in tiles), min(t.y for t in tiles)
-    right, bottom = max(t.x + t.width for t in tiles), max(t.y + t.height for t in tiles)
-    return Region(x, y, right - x, bottom - y)
-
-
 def lamp_light(
     scene: bpy.types.Scene, field: Field, lamps: Environment, samples: int, share: float = 0.0
 ) -> Steps:
@@ -84,7 +75,7 @@ def lamp_light(
     Zero outside the field's tiles; share: how far the whole work is. Raises SceneError,
     CancelledError; the scene stays as it is.
     """
-    region = region_of(field)
+    region = field.region
     out: NDArray[np.float32] = np.zeros((*field.shape, 3), np.float32)
     with _lit_by(scene, field, lamps) as (on, group):
         on.change("cycles.samples", samples)
@@ -125,7 +116,7 @@ def _lit_by(
         group = free_mark() + "lamps"
         on.scene.world = world_of(on, shown, group)
         on.scene.view_layers[0].lightgroups.add(name=group)
-        set_region(on.scene, region_of(field))
+        set_region(on.scene, field.region)
         yield on, group
 
 

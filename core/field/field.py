@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..description import Description
 from ..errors import FieldError, HemicubeError
 from ..hemicube import Hemicube
+from ..region import Region
 from .tile import OTHERS, Tile
 
 VERSION = 2
@@ -84,6 +85,14 @@ class Field:
     @property
     def about(self) -> dict[str, Any]:
         return self.head.get("about") or {}
+
+    @property
+    def region(self) -> Region:
+        """The rectangle around all tiles."""
+        tiles = [tile.region for tile in self.tiles]
+        x, y = min(t.x for t in tiles), min(t.y for t in tiles)
+        right, bottom = max(t.x + t.width for t in tiles), max(t.y + t.height for t in tiles)
+        return Region(x, y, right - x, bottom - y)
 
     def proxy(self, factor: int) -> Field:
         """The field at 1 / factor of the size, see `proxy`. Raises FieldError where there is none,

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from arto.arto_addon import work
 from arto.arto_addon.blender.colour import working_space
-from arto.arto_addon.capture.beside import TAKES
 from arto.arto_addon.fit import fit
 from arto.arto_addon.plate import plate
 from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import paths
+from arto.arto_addon.stage.takes import TAKES
 from arto.core import exr
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.catcher import catch

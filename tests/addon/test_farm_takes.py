@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from arto.arto_addon import work
 from arto.arto_addon.capture import planned, room
-from arto.arto_addon.capture.beside import TAKES
 from arto.arto_addon.capture.capture import capture
 from arto.arto_addon.farm import gather as gathering
 from arto.arto_addon.farm import part as parts
@@ -22,6 +21,7 @@ from arto.arto_addon.farm.gather import gather
 from arto.arto_addon.fit import fit
 from arto.arto_addon.plate import plate
 from arto.arto_addon.shot import paths
+from arto.arto_addon.stage.takes import TAKES
 from arto.core import exr
 from arto.core.errors import CancelledError, FarmError, FieldError, SceneError
 from arto.core.field.field import Field

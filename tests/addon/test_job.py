@@ -8,10 +8,11 @@ import bpy
 import numpy as np
 import pytest
 from arto.arto_addon.job import run, snapshot
-from arto.arto_addon.job.task import State, Task, clock
+from arto.arto_addon.job.task import State, Task
 from arto.arto_addon.shot import home
 from arto.arto_addon.shot.fingerprint import changes, fingerprint
 from arto.core.errors import ArtoError
+from arto.core.units import clock
 from scene_tools import add_mesh, small_scene
 
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import arto
-from arto.arto_addon.stage.settings import CHANGES, looks_otherwise, page
+from arto.arto_addon.stage.settings import CHANGES, looks_otherwise
 from scene_tools import captured, small_scene
+
+from bench.changes import page
 
 DOCS = Path(arto.__file__).parent / "docs"
 

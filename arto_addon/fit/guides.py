@@ -1,0 +1,54 @@
+"""The guides of a field, its albedo and normals, which steer the denoiser of whatever it shows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.field.field import Field
+from ...core.field.tile_writer import write_layer
+from ...core.field.writer import write_head
+from ..blender import denoise
+from ..work import Progress, Steps
+
+# From so many samples of a capture on, what is left of noise in its guides does no harm
+# (docs/accuracy.md).
+CLEAN_SAMPLES = 64
+
+
+def guides_of(field: Field) -> dict[str, NDArray]:
+    """The guides that a field carries, by name."""
+    names = ("albedo", "normal")
+    return {n: field.layer(n) for n in names if field.has_layer(n)}
+
+
+def clean(field: Field) -> bool:
+    """Whether a field's guides have next to no noise."""
+    about = field.about
+    return about.get("guides") == CLEAN or about.get("samples", 0) >= CLEAN_SAMPLES
+
+
+# What a field says of guides that were denoised when it was written.
+CLEAN = "clean"
+
+
+def cleaned(scene: bpy.types.Scene, folder: Path) -> Steps:
+    """Denoise the guides of a new field, so that no relight has to, where the scene's relights are
+    denoised at all."""
+    field = Field(folder)
+    guides = guides_of(field)
+    if not scene.arto.denoise or clean(field) or not guides or not denoise.available():
+        return
+    yield Progress(0.99, "denoising the guides")
+    for name, pixels in guides.items():
+        # a normal is from -1 to 1, and a denoiser of pictures knows nothing below 0
+        low, span = (-1.0, 2.0) if name == "normal" else (0.0, 1.0)
+        noisy = ((pixels - low) / span).astype(np.float32)
+        better = denoise.denoise({}, noisy, like=scene) * span + low
+        for tile in field.tiles:
+            write_layer(tile.folder, name, better[tile.region.slices])
+    field.head["about"]["guides"] = CLEAN
+    write_head(folder, field.head)
