@@ -1,4 +1,5 @@
-"""`core` and Blender do not know each other; modules stay small; EXR files have one door."""
+"""`core` and Blender do not know each other; modules stay small; EXR files have one door; imports
+flow one way."""
 
 from __future__ import annotations
 
@@ -78,6 +79,85 @@ def test_the_house_is_as_the_architecture_says() -> None:
     rooms = {p.parent.name for p in HOUSE if p.parent.parent.name == "arto_addon"}
     rooms |= {p.stem for p in CORE.glob("*.py") if p.stem != "__init__"}
     assert not {room for room in rooms if f"`{room}`" not in said}
+
+
+# The rooms in the order of their imports: each may import those before it, and none after it. A
+# module that stands alone is a room by itself. docs/architecture.md quotes both lists.
+FLOW = {
+    "core": """errors < units < files < region < description < shot < metrics < patterns < measure
+    < hemicube < exr < cryptomatte < capture < light < supports < field < fit < lights < relight
+    < catcher < preview < inside < verify""",
+    "arto_addon": """work < blender < stage < shot < world < plate < fit < capture < relight < shoot
+    < job < live < farm < ui""",
+}
+
+
+def named(file: Path) -> str:
+    """The dotted name of a module: `core.exr.file`, and `core.exr` for the room's own file."""
+    return ".".join(file.relative_to(CORE.parent).with_suffix("").parts).removesuffix(".__init__")
+
+
+def imports_of(file: Path, modules: set[str]) -> set[str]:
+    """The modules of the house that a module imports, wherever in it."""
+    folder = named(file).split(".")[: None if file.name == "__init__.py" else -1]
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text())):
+        if not isinstance(node, ast.ImportFrom) or not node.level:
+            continue
+        above = folder[: len(folder) - node.level + 1]
+        source = ".".join([*above, *(node.module or "").split(".")]).strip(".")
+        for alias in node.names:
+            whole = f"{source}.{alias.name}"
+            found.add(whole if whole in modules else source)
+    return found & modules
+
+
+def graph(files: list[Path]) -> dict[str, set[str]]:
+    modules = {named(file) for file in files}
+    return {named(file): imports_of(file, modules) - {named(file)} for file in files}
+
+
+def circle(imports: dict[str, set[str]]) -> list[str]:
+    """Modules that import each other in a circle, as many as there are; empty for none."""
+    left = dict(imports)
+    while free := [module for module, others in left.items() if not others & left.keys()]:
+        for module in free:
+            del left[module]
+    return sorted(left)
+
+
+def test_a_circle_of_imports_is_found() -> None:
+    assert circle({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}, "e": set()}) == [*"abcd"]
+    assert circle({"a": {"b"}, "b": {"c"}, "c": set()}) == []
+
+
+def test_no_import_goes_in_a_circle() -> None:
+    imports = graph([*MODULES, *sorted((CORE.parent / "arto_addon").rglob("*.py"))])
+    # the walk sees an import of a name, of a module, and of a room
+    assert {"core.region", "core.supports"} <= imports["core.field.merged"]
+    assert sum(map(len, imports.values())) > 300
+    assert not circle(imports)
+
+
+@pytest.mark.parametrize("world", FLOW)
+def test_rooms_import_one_way(world: str) -> None:
+    files = sorted((CORE.parent / world).rglob("*.py"))
+    order = FLOW[world].replace("<", " ").split()
+    against = []
+    for module, others in graph(files).items():
+        rooms = [module.split(".")[1]] if "." in module else []
+        for room in rooms:
+            assert room in order, f"'{room}' is new: give it a place in FLOW and on the page"
+            for other in (o for o in others if "." in o):
+                if order.index(other.split(".")[1]) > order.index(room):
+                    against.append(f"{module} imports {other}")
+    assert not against
+
+
+@pytest.mark.parametrize("world", FLOW)
+def test_the_page_says_the_order_of_the_rooms(world: str) -> None:
+    said = (CORE.parent / "docs" / "architecture.md").read_text().split()
+    assert " ".join(FLOW[world].split()) in " ".join(said)
 
 
 def in_new_process(code: str) -> str:
