@@ -44,9 +44,8 @@ def discs(scene, degrees: float) -> float:
     return RADIANCE * math.pi * chord**2  # the area of a cap is that of a disc of its chord
 
 
-@pytest.mark.parametrize(
-    ("degrees", "width"), [(0.1, 256), (0.1, 2048), (0.5, 1024), (10, 256), (10, 2048)]
-)
+# the finest lamp in a fine map, the widest one in a coarse map
+@pytest.mark.parametrize(("degrees", "width"), [(0.1, 2048), (10, 256)])
 def test_discs_keep_their_light(scene, width, degrees):
     """Each to 1%: in the map's middle, high up, across its seam, on a pole and beside one."""
     expected = discs(scene, degrees)

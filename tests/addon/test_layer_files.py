@@ -134,7 +134,7 @@ def test_cryptomattes_are_handed_on(lit, tmp_path, interleaved):
         relit_layers(lit)
 
 
-@pytest.mark.parametrize("prefix", ["a.b", "..", "ü .x", "/x", "10"])
+@pytest.mark.parametrize("prefix", ["..", "/ü .x", "10"])
 def test_any_prefix_makes_names_that_programs_read(lit, tmp_path, prefix):
     """A dot parts a layer from its channels: with one in a prefix the mixer found no layer. They
     add up, and the mixer shows them."""

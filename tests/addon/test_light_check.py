@@ -31,9 +31,8 @@ def said(scene, **settings):
         return work.run(check_light(on, hemicube))[1]
 
 
-@pytest.mark.parametrize("preset", ["full", "paper"])
+@pytest.mark.parametrize(("preset", "seed"), [("full", 0), ("paper", 1)])
 @pytest.mark.parametrize("name", scenes.SCENES)
-@pytest.mark.parametrize("seed", [0, 1])
 def test_it_never_cries_wolf(name, preset, seed):
     scene = scenes.SCENES[name](width=320, height=240)
     assert said(scene, preset=preset, seed=seed) is None
@@ -111,7 +110,7 @@ def test_a_room_behind_such_glass_is_relit_as_cycles_renders_it(tmp_path):
     basis = there.read(0).basis
     assert (basis[:, 1:].max(axis=1) <= basis[:, 0] * 1.0001 + 1e-7).all()
     work.run(fit.fit(scene))
-    for hdri, lamps in (("sunset", False), ("courtyard", False), ("interior", True)):
+    for hdri, lamps in (("sunset", False), ("interior", True)):
         worlds.set_world_hdri(scene, hdri)
         scene.arto.lamps = lamps
         path, _ = work.run(relight.relight(scene))
@@ -120,7 +119,7 @@ def test_a_room_behind_such_glass_is_relit_as_cycles_renders_it(tmp_path):
         truth = (one + two)[..., :3] / 2
         noise = np.abs(one - two)[..., :3].mean() / truth.mean()
         assert abs(picture[..., :3].mean() / truth.mean() - 1) < 0.03
-        # what is left is where the light is, not how much: 0.06, 0.08 and 0.15 over the noise
+        # what is left is where the light is, not how much: 0.06 and 0.15 over the noise
         assert np.abs(picture[..., :3] - truth).mean() / truth.mean() < noise + 0.18
 
 

@@ -18,6 +18,7 @@ from arto.arto_addon.world import kept
 from arto.core import exr
 from arto.core.errors import CaptureSetError, SceneError
 from arto.core.hemicube import Hemicube
+from arto.core.light.environment import Environment
 from arto.core.light.light import PatchLight
 from scene_tools import captured, hdri, small_scene, smooth
 
@@ -85,16 +86,20 @@ CHANGES = {
 
 @pytest.mark.parametrize("change", CHANGES)
 def test_another_world_is_made_anew(scene, monkeypatch, change):
-    made = counting(monkeypatch)
+    """Each map is asked for once, and is the one that was made of that world and width."""
+    made = []
+
+    def bake(_scene, width, *_):
+        made.append(width)
+        return Environment(np.full((width // 2, width, 3), len(made), np.float32))
+
+    monkeypatch.setattr(kept, "bake", bake)
     hdri(scene, smooth())
-    kept.environment(scene, 64)
-    kept.environment(scene, 64)
-    assert len(made) == 1
+    assert [kept.environment(scene, 64).image.max() for _ in range(2)] == [1, 1]
     CHANGES[change](scene)
-    kept.environment(scene, 64)
-    assert len(made) == 2
-    kept.environment(scene, 128)
-    assert len(made) == 3
+    assert [kept.environment(scene, 64).image.max() for _ in range(2)] == [2, 2]
+    assert [kept.environment(scene, 128).image.max() for _ in range(2)] == [3, 3]
+    assert made == [64, 64, 128]
 
 
 def test_a_world_that_is_bent_by_its_turn_is_made_anew(scene, monkeypatch):

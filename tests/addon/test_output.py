@@ -117,9 +117,8 @@ def test_render_settings_of_writing_decide_nothing(plain, tmp_path):
     assert count > 60
 
 
-@pytest.mark.parametrize(
-    "name", ["a{b}", "{blend_name}", "}{", "{{x}}", "100%", "%04d %s", "v1.2.#3###", "ü 日本 é"]
-)
+# what Blender's own paths, or Python's, give a meaning: a few in a name, in two orders
+@pytest.mark.parametrize("name", ["}{ 100% v1.2.#3### {{x}}", "ü 日本 %04d %s a{b} {blend_name}"])
 def test_odd_folders_are_just_folders(tmp_path, name):
     """Whatever is in a folder's name, the plate is the same and stands where it was asked for."""
     folder = tmp_path / name

@@ -86,7 +86,7 @@ def sun(scene, elevation, azimuth=0.7321):
     return radiance * 2 * math.pi * (1 - cosine)
 
 
-@pytest.mark.parametrize("elevation", [60, 15, 3])
+@pytest.mark.parametrize("elevation", [60, 3])
 def test_sun_of_half_a_degree_keeps_its_energy(scene, elevation):
     expected = sun(scene, math.radians(elevation))
     np.testing.assert_allclose(bake(scene, 1024).irradiance(), expected, rtol=0.01)
