@@ -45,6 +45,7 @@ def discs(scene, degrees: float) -> float:
 
 
 # the finest lamp in a fine map, the widest one in a coarse map
+@pytest.mark.newest
 @pytest.mark.parametrize(("degrees", "width"), [(0.1, 2048), (10, 256)])
 def test_discs_keep_their_light(scene, width, degrees):
     """Each to 1%: in the map's middle, high up, across its seam, on a pole and beside one."""

@@ -43,6 +43,7 @@ def sky(folder):
     return scene
 
 
+@pytest.mark.newest
 @pytest.mark.parametrize("how", ["shader", "region", "plain"])
 def test_plate_over_its_world(tmp_path, how):
     """With a film that is opaque: holes are black and transparent, outside a region is nothing, and

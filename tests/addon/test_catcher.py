@@ -35,6 +35,7 @@ from scene_tools import (
 from shot_tools import bare_of, cycles_catcher, relit_and_share, with_catcher
 
 
+@pytest.mark.newest
 def test_as_cycles_own_catcher(tmp_path):
     """Under a coloured sky: the light on the things, their outlines, the share of the footage in
     their shadows, each to within what two of Cycles' own renders differ by and a little."""
@@ -193,6 +194,7 @@ def test_takes_of_two_captures_are_not_mixed(tmp_path):
         relit_and_share(scene)
 
 
+@pytest.mark.newest
 def test_lamps_of_the_world_fall_on_both(tmp_path):
     """A sun in the map, rendered by itself, throws its shadow onto the ground."""
     scene = with_catcher(tmp_path, samples=128)
@@ -261,6 +263,7 @@ def test_frames_with_a_catcher(tmp_path):
         np.testing.assert_allclose(found[..., :3], expected, atol=2e-3)
 
 
+@pytest.mark.newest
 def test_an_earlier_capture_stays_whole_until_the_new_one_is(tmp_path):
     """Stopped in its last take, a new capture has replaced nothing of the old one."""
     scene = with_catcher(tmp_path, samples=4, patches=1)

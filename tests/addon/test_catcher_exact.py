@@ -61,6 +61,7 @@ def takes_by_cycles(scene, samples, seed, tmp_path):
     return found
 
 
+@pytest.mark.newest
 def test_in_white_the_ratio_is_that_of_cycles_own_renders(tmp_path):
     """Of the same takes at the same samples, to within what two seeds of these differ by."""
     scene = on_white_ground(tmp_path)
@@ -87,6 +88,7 @@ def test_in_white_the_ratio_is_that_of_cycles_own_renders(tmp_path):
     assert nothing.any() and (share[nothing] == 1).all()
 
 
+@pytest.mark.newest
 @pytest.mark.parametrize("support", ["auto", "linear"])
 def test_the_fields_part_is_the_uniform_transport(tmp_path, support):
     """What a fit leaves out of one entry is in another: all patches at once give what was

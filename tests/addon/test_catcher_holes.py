@@ -15,6 +15,7 @@ from shot_tools import comp_by_cycles, cycles_catcher, relit_and_share, with_cat
 FOOTAGE = np.float32([0.3, 0.5, 0.8])
 
 
+@pytest.mark.newest
 @pytest.mark.parametrize("how", ["collection", "mixed"])
 def test_footage_is_seen_through_a_hole(tmp_path, how):
     """As in Cycles' own picture, to within what two of its renders differ by; and by the live

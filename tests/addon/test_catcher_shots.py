@@ -24,6 +24,7 @@ def assert_in_footage_as_by_cycles(scene, tmp_path, samples=256):
     return share, comp
 
 
+@pytest.mark.newest
 @pytest.mark.parametrize("flag", ["visible_shadow", "visible_diffuse"])
 def test_a_thing_that_some_rays_pass(tmp_path, flag):
     """A world's light comes by shadow rays and by others, in part each: the shadow of what one of

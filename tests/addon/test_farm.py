@@ -69,6 +69,7 @@ def test_parts_are_what_one_machine_makes(farm_scene, tmp_path, monkeypatch):
     assert_same(arrays(found), alone)
 
 
+@pytest.mark.newest
 def test_two_seeds_are_one_capture_of_twice_the_samples(farm_scene, tmp_path):
     """Their error, against many samples, is that of the doubled number, to a hundredth."""
     farm_scene.arto.adaptive, farm_scene.arto.support = False, "linear"
@@ -99,6 +100,7 @@ def test_two_seeds_are_one_capture_of_twice_the_samples(farm_scene, tmp_path):
     assert errors[2] == pytest.approx(errors[1], rel=0.01)
 
 
+@pytest.mark.newest
 def test_kept_images_of_seeds_are_a_capture_set(farm_scene, tmp_path):
     """Which can be fitted again; its images are those of the seeds, by their samples. A field of
     one seed's samples alone is not taken for one of it."""
@@ -122,6 +124,7 @@ def test_kept_images_of_seeds_are_a_capture_set(farm_scene, tmp_path):
     assert Field(work.run(fit.fit(farm_scene))).about["samples"] == 32
 
 
+@pytest.mark.newest
 def test_frames_are_as_a_sequence_has_them(farm_scene, tmp_path):
     """The same patches for all, and each frame's field in its place."""
     ball = farm_scene.objects["Matt"]

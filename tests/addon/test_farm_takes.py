@@ -101,6 +101,7 @@ def test_parts_of_takes_are_what_one_machine_makes(tmp_path, monkeypatch):
     assert_same(fields(scene), alone)
 
 
+@pytest.mark.newest
 def test_stretches_of_takes_are_one_capture_of_their_samples(tmp_path):
     """Their noise is the same where takes are divided by each other, as in one piece: the share is
     off by a ten-thousandth, at most, of what another seed's is off by."""
@@ -129,6 +130,7 @@ def test_stretches_of_takes_are_one_capture_of_their_samples(tmp_path):
         assert np.abs(found - right).mean() < 1e-4 * noise
 
 
+@pytest.mark.newest
 def test_a_gathering_stopped_between_takes_is_gone_on_with(tmp_path, monkeypatch):
     """What is there of a new capture is never shown with what is left of an old one, also where
     that is of the same settings, and not of two seeds."""

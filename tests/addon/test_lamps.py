@@ -87,6 +87,7 @@ def test_with_its_lamps_the_plate_is_what_cycles_renders(shot, tmp_path):
     assert "of the world's light" in said and nothing == "no"
 
 
+@pytest.mark.newest
 def test_lamps_and_rest_are_the_whole_light(shot):
     """Light is linear: the two renders add up to that of the whole map, and the scene's own lamp is
     in none of them."""

@@ -163,6 +163,7 @@ def test_the_mixer_in_the_compositor(lit, tmp_path):
     np.testing.assert_allclose(composited(lit, tmp_path), picture, rtol=1e-4, atol=1e-5)
 
 
+@pytest.mark.newest
 @pytest.mark.parametrize("patches", [1, 3])
 def test_own_lamps_by_their_light_group(tmp_path, patches):
     """Each group's layer is what the lamp by itself gives, also beside more than 255 groups of

@@ -31,6 +31,7 @@ def said(scene, **settings):
         return work.run(check_light(on, hemicube))[1]
 
 
+@pytest.mark.newest
 @pytest.mark.parametrize(("preset", "seed"), [("full", 0), ("paper", 1)])
 @pytest.mark.parametrize("name", scenes.SCENES)
 def test_it_never_cries_wolf(name, preset, seed):
@@ -98,6 +99,7 @@ def test_a_soft_shadow_that_is_not_a_worlds(tmp_path, flag):
     assert warning and words in warning["text"]
 
 
+@pytest.mark.newest
 def test_a_room_behind_such_glass_is_relit_as_cycles_renders_it(tmp_path):
     """Without sampled patches it had a fiftieth of its light."""
     scene, window = room(tmp_path)

@@ -158,6 +158,7 @@ def test_a_turntable_is_so_many_relights(scene, monkeypatch):
     assert len({picture(p).tobytes() for p in done}) == 4
 
 
+@pytest.mark.newest
 def test_worlds_from_files(scene, tmp_path):
     rng = np.random.default_rng(0)
     field_of(scene)
@@ -237,6 +238,7 @@ def test_frames_are_a_sequence_in_the_compositor(scene):
     np.testing.assert_allclose(np.array(shown) / shown[0], [1, 2, 3], rtol=1e-2)
 
 
+@pytest.mark.newest
 def test_an_animated_shot(scene):
     """A field for each frame, of the same patches; a frame without one is refused in words."""
     thing = scene.objects["Matt"]

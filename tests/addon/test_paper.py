@@ -12,6 +12,7 @@ from arto.core.hemicube import FACES
 from scene_tools import assert_as_cycles, captured, set_colour, small_scene
 
 
+@pytest.mark.newest
 def test_the_papers_way(tmp_path):
     """Four faces above the horizon, nine patterns, one render a pattern, Algorithm 1: under white
     light from just those directions it is what Cycles renders."""

@@ -20,6 +20,7 @@ def adaptive(folder):
     return scene
 
 
+@pytest.mark.newest
 def test_patches_of_many_sizes_light_the_scene_as_cycles_does(tmp_path):
     """The floor is opaque: of the light from below little arrives, and few patches stay there.
     Under white light the plate is Cycles' picture, with the noise of its paths."""
@@ -37,6 +38,7 @@ def test_patches_of_many_sizes_light_the_scene_as_cycles_does(tmp_path):
     assert_as_cycles(exr.read(path)[""], scene, 64, tmp_path)
 
 
+@pytest.mark.newest
 def test_going_on_does_not_probe_again(tmp_path):
     scene = adaptive(tmp_path)
     scene.arto.samples, scene.arto.memory = 4, 16

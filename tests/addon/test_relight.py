@@ -55,6 +55,7 @@ def test_white_world_is_met_within_noise(tmp_path):
     np.testing.assert_allclose(picture[..., 3], one[..., 3], atol=0.05)
 
 
+@pytest.mark.newest
 def test_smooth_world_is_met(tmp_path):
     """Directions are right: a world with a colour for each direction, on a scene with mirrors."""
     scene = transparent(small_scene(tmp_path))
@@ -68,6 +69,7 @@ def test_smooth_world_is_met(tmp_path):
     assert error < floor + 0.03, (error, floor)
 
 
+@pytest.mark.newest
 def test_turning_world_and_hemicube_together_changes_nothing(tmp_path):
     """The same directions carry the same light whichever patch they fall on: with the hemicube
     turned, the picture under the same world is the same within noise."""
@@ -272,6 +274,7 @@ def test_without_a_denoiser_the_plate_says_so(tmp_path, monkeypatch):
     assert "without Open Image Denoise" in exr.header(path)["arto.denoised"]
 
 
+@pytest.mark.newest
 def test_narrow_reflection_beats_sixteen_times_as_many_whole_patches(tmp_path):
     """A flat mirror: each pixel sees far less than a patch. 96 patches with a box show the world
     that 1,536 whole patches blur."""

@@ -84,6 +84,7 @@ def test_a_support_that_the_patterns_cannot_tell_is_refused_first(tmp_path):
             assert not isinstance(step, work.Render)
 
 
+@pytest.mark.newest
 @pytest.mark.parametrize("after", [1, 2])
 def test_a_stopped_stream_goes_on(tmp_path, monkeypatch, after):
     """No tile is rendered twice, and the field is that of a stream in peace."""

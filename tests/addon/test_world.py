@@ -86,6 +86,7 @@ def sun(scene, elevation, azimuth=0.7321):
     return radiance * 2 * math.pi * (1 - cosine)
 
 
+@pytest.mark.newest
 @pytest.mark.parametrize("elevation", [60, 3])
 def test_sun_of_half_a_degree_keeps_its_energy(scene, elevation):
     expected = sun(scene, math.radians(elevation))
