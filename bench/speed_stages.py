@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from arto.core.capture.basis_images import Around
 from arto.core.capture.capture_set import CaptureSet
+from arto.core.capture.tile_data import Around
 from arto.core.field.field import Field
 from arto.core.field.tile_writer import TileWriter
 from arto.core.field.writer import FieldWriter

@@ -11,8 +11,8 @@ from typing import Any
 import bpy
 
 from ...core import exr
-from ...core.capture.basis_images import GRAIN, GROUP, group_name
 from ...core.capture.capture_set import write_header
+from ...core.capture.names import GRAIN, GROUP, group_name
 from ...core.errors import ArtoError, CaptureSetError
 from ...core.files import Lock, whole
 from ...core.fit.choice import check as check_choice

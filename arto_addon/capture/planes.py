@@ -12,7 +12,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...core.capture.basis_images import GRAIN, GROUP, group_name
+from ...core.capture.names import GRAIN, GROUP, group_name
 from ...core.hemicube import FACE_NAMES, Hemicube
 from ...core.patterns import PatternSet, pattern_set
 from ..blender.nodes import Nodes, made_of_nodes, new_material

@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 
-from ...core.capture.basis_images import GRAIN
+from ...core.capture.names import GRAIN
 from ...core.capture.refine import check as can_refine
 from ...core.errors import ArtoError
 from ...core.fit.choice import check as check_choice

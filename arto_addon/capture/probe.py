@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core.capture.basis_images import GROUP
+from ...core.capture.names import GROUP
 from ...core.capture.refine import check, refine
 from ...core.errors import CaptureSetError
 from ...core.hemicube import FINEST, Hemicube

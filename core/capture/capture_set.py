@@ -20,7 +20,9 @@ from ..errors import CaptureSetError, HemicubeError, PatternError
 from ..files import write_text
 from ..hemicube import Hemicube
 from ..patterns import PatternSet, pattern_set
-from .basis_images import BasisImages, TileData, group_name
+from .basis_images import BasisImages
+from .names import group_name
+from .tile_data import TileData
 
 VERSION = 1
 HEADER = "capture.json"

@@ -3,18 +3,8 @@ picture stands in what is delivered (`window`)."""
 
 from __future__ import annotations
 
-from .file import (
-    Layers,
-    header,
-    part_names,
-    parts,
-    read,
-    whole_parts,
-    windows,
-    write,
-    write_layered,
-    write_planes,
-)
+from .reading import Layers, header, part_names, parts, read, whole_parts, windows
+from .writing import write, write_layered, write_planes
 
 __all__ = [
     "Layers",

@@ -128,7 +128,7 @@ class Field:
 
     @property
     def own_layers(self) -> list[str]:
-        """The layers of light groups of the scene's own lamps, see `basis_images.own_layer`."""
+        """The layers of light groups of the scene's own lamps, see `capture.names.own_layer`."""
         found = {name for tile in self.tiles for name in tile.own_layers()}
         return sorted(name for name in found if self.has_layer(name))
 

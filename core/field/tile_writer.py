@@ -8,7 +8,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from ..capture.basis_images import OF_ONE_RAY
+from ..capture.names import OF_ONE_RAY
 from ..errors import FieldError
 from ..files import whole
 from ..region import Region

@@ -33,7 +33,7 @@ class Evidence:
     sizes: (K, n) coefficients, summed over channels; least: (n,) under which one is dropped; total:
     (n,) that of all patches; shape: (h, w) of the tile, n = h x w; solid_angles: (K,) of the
     patches; samples: samples a pixel of the capture, None without noise (photographs); grain: of
-    patch k, (h, w), see `basis_images.GRAIN`.
+    patch k, (h, w), see `capture.names.GRAIN`.
     """
 
     sizes: NDArray[np.float32]

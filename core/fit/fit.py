@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..capture.basis_images import BasisImages, TileData
+from ..capture.basis_images import BasisImages
 from ..capture.capture_set import CaptureSet
 from ..capture.moments import Moments
+from ..capture.tile_data import TileData
 from ..field.tile_writer import TileWriter
 from ..field.writer import FieldWriter, write_tile
 from ..hemicube import Hemicube

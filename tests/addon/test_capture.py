@@ -15,7 +15,7 @@ from arto.arto_addon.fit import fit
 from arto.arto_addon.shot import status
 from arto.arto_addon.stage.stage import picture_region
 from arto.core import exr
-from arto.core.capture.basis_images import GROUP
+from arto.core.capture.names import GROUP
 from arto.core.errors import ArtoError, CancelledError, CaptureSetError, SceneError
 from scene_tools import (
     HEIGHT,

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from arto.core import exr
-from arto.core.capture import basis_images, capture_set
+from arto.core.capture import capture_set, names
 from arto.core.field.field import Field
 from arto.core.fit import fit
 from arto.core.hemicube import Hemicube
@@ -173,7 +173,7 @@ def _write_scene(folder: Path, scene: Scene, regions: list[Region] | None = None
         layers = {"Combined": np.dstack([rgb, scene.alpha[cut]]).astype(np.float32)}
         for k in range(len(scene.hemicube)):
             for p, name in enumerate(scene.patterns.patterns):
-                part = f"Combined_{basis_images.group_name(k, name)}"
+                part = f"Combined_{names.group_name(k, name)}"
                 layers[part] = scene.basis[k, p][cut]
         exr.write(folder / f"tile_{n:04d}.exr", layers)
         head["tiles"].append(

@@ -46,7 +46,7 @@ def test_the_walk_sees_imports_of_every_kind(tmp_path: Path) -> None:
 @pytest.mark.parametrize("module", MODULES, ids=lambda m: str(m.relative_to(CORE)))
 def test_core_module_is_free_of_blender_and_small(module: Path) -> None:
     assert not imported(module) & (BLENDER | {"arto_addon"})
-    assert ("OpenEXR" in imported(module)) == (module.name == "file.py")
+    assert ("OpenEXR" in imported(module)) == (module.name == "library.py")
     assert len(module.read_text().splitlines()) < 400
 
 
@@ -93,7 +93,7 @@ FLOW = {
 
 
 def named(file: Path) -> str:
-    """The dotted name of a module: `core.exr.file`, and `core.exr` for the room's own file."""
+    """The dotted name of a module: `core.exr.reading`, and `core.exr` for the room's own file."""
     return ".".join(file.relative_to(CORE.parent).with_suffix("").parts).removesuffix(".__init__")
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import OpenEXR
 import pytest
 from arto.core import exr
-from arto.core.capture import basis_images, capture_set
+from arto.core.capture import capture_set, names
 from arto.core.capture.capture_set import HEADER, CaptureSet
 from arto.core.errors import CaptureSetError
 from arto.core.hemicube import Hemicube
@@ -163,10 +163,10 @@ def test_a_tile_may_lie_in_several_files(tmp_path: Path, scene, write_scene) -> 
 
 
 def test_a_name_says_patch_and_pattern() -> None:
-    name = f"Combined_{basis_images.group_name(7, 'gradient45')}"
-    match = basis_images.GROUP.search(f"ViewLayer.{name}")
+    name = f"Combined_{names.group_name(7, 'gradient45')}"
+    match = names.GROUP.search(f"ViewLayer.{name}")
     assert match and (int(match[1]), match[2]) == (7, "gradient45")
-    assert basis_images.GROUP.search(f"Not{name}") is None
+    assert names.GROUP.search(f"Not{name}") is None
 
 
 # --- what is refused -----------------------------------------------------------------------------
