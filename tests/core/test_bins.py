@@ -37,7 +37,7 @@ def test_a_map_of_another_size_or_cube_is_not_mistaken(noisy, monkeypatch) -> No
     for cube in cubes:
         for e in maps:
             for binned, r in zip(next(again), (4, 8), strict=True):
-                monkeypatch.setattr("arto.core.light.light.bins._KEPT", {})
+                monkeypatch.setattr("arto.core.light.bins._KEPT", {})
                 np.testing.assert_array_equal(binned, PatchLight(e, cube, r).binned)
 
 
