@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import bpy
 
@@ -45,6 +45,9 @@ class Render:
             raise CancelledError(STOPPED)
 
 
+_Step = TypeVar("_Step")
+_Other = TypeVar("_Other")
+_Made = TypeVar("_Made")
 Steps = Generator[Progress | Render, None, Any]
 
 
@@ -90,36 +93,60 @@ def blocking_render(request: Render) -> None:
     request.state = "cancelled" if ended or "FINISHED" not in result else "done"
 
 
-def part_of(steps: Steps, begin: float, span: float) -> Steps:
-    """The steps of a piece of work that is a part of a larger one: from `begin`, over `span`."""
+def retold(
+    steps: Generator[_Step, None, _Made], change: Callable[[_Step], _Other | None]
+) -> Generator[_Other, None, _Made]:
+    """The steps of a piece of work as `change` tells them; a step that it makes None of is left
+    out. Returns what the work returns, and closes the work however it ends."""
     try:
         while True:
-            step = next(steps)
-            step.share = begin + span * step.share
-            if isinstance(step, Render):
-                step.span *= span
-            yield step
+            if (other := change(next(steps))) is not None:
+                yield other
     except StopIteration as end:
         return end.value
     finally:
         steps.close()
+
+
+def driven(steps: Generator[_Step, None, _Made], do: Callable[[_Step], None]) -> _Made:
+    """Drive the work to its end, with `do` for each step; returns what the work returns."""
+    try:
+        while True:
+            do(next(steps))
+    except StopIteration as end:
+        return end.value
+    finally:
+        steps.close()
+
+
+def part_of(steps: Steps, begin: float, span: float, title: str = "") -> Steps:
+    """The steps of a piece of work that is a part of a larger one: from `begin`, over `span`.
+
+    title: what is put before the text of each step.
+    """
+
+    def change(step: Progress | Render) -> Progress | Render:
+        step.share, step.text = begin + span * step.share, title + step.text
+        if isinstance(step, Render):
+            step.span *= span
+        return step
+
+    return retold(steps, change)
 
 
 def run(steps: Steps, say: Callable[[Progress | Render], None] | None = None) -> Any:
     """Drive the work to its end, blocking; returns what it returns."""
+
+    def do(step: Progress | Render) -> None:
+        if say:
+            say(step)
+        if isinstance(step, Render):
+            blocking_render(step)
+
     try:
-        while True:
-            step = next(steps)
-            if say:
-                say(step)
-            if isinstance(step, Render):
-                blocking_render(step)
-    except StopIteration as end:
-        return end.value
+        return driven(steps, do)
     except KeyboardInterrupt:
         raise CancelledError(STOPPED) from None
-    finally:
-        steps.close()
 
 
 class ProgressLines:

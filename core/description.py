@@ -9,9 +9,9 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from .errors import ArtoError
 from .region import Region
@@ -20,6 +20,7 @@ from .region import Region
 MOST_BYTES = 64 << 20
 LARGEST_SIDE = 65536
 MOST_TILES = 100_000
+_Choice = TypeVar("_Choice", bound=str)
 _NAME = re.compile(r"[\w][\w .~-]{0,120}")
 
 
@@ -57,12 +58,35 @@ class Description:
             raise self.wrong(name, value)
         return value
 
-    def number(self, name: str, default: float) -> float:
-        """A finite number, or a default where there is none."""
+    def number(
+        self, name: str, default: float, low: float = -math.inf, high: float = math.inf
+    ) -> float:
+        """A finite number within bounds, both included, or a default where there is none."""
         value = self.data.get(name, default)
-        if type(value) not in (int, float) or not math.isfinite(value):
+        if type(value) not in (int, float) or not math.isfinite(value) or not low <= value <= high:
             raise self.wrong(name, value)
         return float(value)
+
+    def text(self, name: str, where: dict[str, Any] | None = None) -> str:
+        """A text, of the whole description or of an object in it."""
+        value = self._of(self.data if where is None else where, name)
+        if not isinstance(value, str):
+            raise self.wrong(name, value)
+        return value
+
+    def choice(self, name: str, among: Iterable[_Choice]) -> _Choice:
+        """One of some texts."""
+        value = self._of(self.data, name)
+        for choice in among:
+            if value == choice:
+                return choice
+        raise self.wrong(name, value)
+
+    def only(self, *names: str, where: dict[str, Any] | None = None) -> None:
+        """Raise where the description, or an object in it, has a value of another name."""
+        for name in self.data if where is None else where:
+            if name not in names:
+                raise self.error(f"{self.path} has an unknown '{name}'")
 
     def kind(self, name: str, kind: type, default: Any = None) -> Any:
         """A value of a type; a default where it is not there or null."""

@@ -2,29 +2,49 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import bpy
 
+from ...core.errors import SceneError
 
-def chosen() -> dict[str, Any]:
-    """The artist's render devices, also where the preferences were not saved."""
+
+@dataclass(frozen=True)
+class Devices:
+    """The artist's render devices.
+
+    kind: the backend, as Cycles' preferences name it (`NONE`, `CUDA`, `OPTIX`, ...); use: by the
+    ID of each device, whether Cycles renders with the device.
+    """
+
+    kind: str
+    use: Mapping[str, bool]
+
+
+def chosen() -> Devices | None:
+    """The artist's render devices, though the preferences were not saved; None without Cycles."""
     addon = bpy.context.preferences.addons.get("cycles")
     if addon is None:
-        return {}
+        return None
     found = addon.preferences
-    return {
-        "kind": found.compute_device_type,
-        "use": {device.id: bool(device.use) for device in found.devices},
-    }
+    return Devices(
+        found.compute_device_type, {device.id: bool(device.use) for device in found.devices}
+    )
 
 
-def use(devices: dict[str, Any]) -> None:
-    """Render with what the artist renders with; what `chosen` gave says what that is."""
+def use(devices: Devices | None) -> None:
+    """Render with the devices that `chosen` gave. Raises SceneError for a kind that is not here."""
     addon = bpy.context.preferences.addons.get("cycles")
-    if addon is None or not devices:
+    if addon is None or devices is None:
         return
-    addon.preferences.compute_device_type = devices["kind"]
+    try:
+        addon.preferences.compute_device_type = devices.kind
+    except TypeError as e:
+        raise SceneError(
+            f"Cycles has no render devices of the kind {devices.kind} here: choose others in the "
+            "preferences, System, Cycles Render Devices"
+        ) from e
     for device in addon.preferences.devices:
-        if device.id in devices["use"]:
-            device.use = devices["use"][device.id]
+        if device.id in devices.use:
+            device.use = devices.use[device.id]

@@ -22,7 +22,7 @@ from ..stage.bounds import rendered
 from ..stage.settings import prepare
 from ..stage.stage import stage
 from ..stage.takes import WHOLE, take
-from ..work import Progress, Render, Steps
+from ..work import Progress, Steps, part_of
 from . import planes, probe
 from .capture import capture
 from .check import check_scene
@@ -50,29 +50,15 @@ def capture_frames(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int
     if not frames:
         raise SceneError("there are no frames to capture: give a first and a last one")
     folders: list[Path] = []
+    one = 1 / len(frames)
     with frame_kept(scene):
         given = yield from together(scene, view_layer, frames)
         for i, frame in enumerate(frames):
             scene.frame_set(frame)
             steps = capture(scene, view_layer, given=given)
-            folders.append((yield from _as_part(steps, i, len(frames), f"frame {frame}: ")))
+            folders.append((yield from part_of(steps, i * one, one, f"frame {frame}: ")))
     yield Progress(1.0, f"captured {len(frames)} frames, {len(given.hemicube)} patches each")
     return folders
-
-
-def _as_part(steps: Steps, part: int, parts: int, title: str) -> Steps:
-    """The steps of one of so many pieces of work, told as a part of the whole."""
-    try:
-        while True:
-            step = next(steps)
-            step.share, step.text = (part + step.share) / parts, title + step.text
-            if isinstance(step, Render):
-                step.span /= parts
-            yield step
-    except StopIteration as end:
-        return end.value
-    finally:
-        steps.close()
 
 
 def together(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> Steps:

@@ -14,6 +14,7 @@ from typing import Any
 from ...core.capture.capture_set import CaptureSet
 from ...core.errors import CancelledError
 from ...core.fit.fit import fit_into
+from ..work import driven
 
 
 class Stream:
@@ -45,15 +46,12 @@ class Stream:
         self._thread.start()
 
     def _fit(self, captured: CaptureSet, number: int) -> dict[str, Any]:
-        steps = fit_into(captured, number, self.folder / self.FIELD)
-        while True:
-            try:
-                self.share = next(steps)
-            except StopIteration as end:
-                return end.value
+        def look(share: float) -> None:
+            self.share = share
             if self._stop.is_set():
-                steps.close()
                 raise CancelledError("cancelled")
+
+        return driven(fit_into(captured, number, self.folder / self.FIELD), look)
 
     def ended(self, patience: float | None) -> tuple[int, dict[str, Any]] | None:
         """The tile that was fitted, and its entry in `field.json`; None where none is, or not

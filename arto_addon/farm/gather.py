@@ -21,7 +21,7 @@ from ..fit.guides import cleaned
 from ..shot import paths, scene_id
 from ..shot.shot import shot_of
 from ..stage.takes import TAKES
-from ..work import Progress, Steps
+from ..work import Progress, Steps, retold
 from .job import Job, Part
 
 
@@ -160,12 +160,9 @@ def _take_field(source: Path, field: Path, name: str) -> None:
 def _fit(captured: CaptureSet, tile: int, tiles: int) -> Steps:
     """Fit a tile of a set into `field` in its folder -> its entry in `field.json`."""
     steps = fit_into(captured, tile, captured.folder / Stream.FIELD)
-    while True:
-        try:
-            share = next(steps)
-        except StopIteration as end:
-            return end.value
-        yield Progress((tile + share) / tiles, f"fitting tile {tile + 1} of {tiles}")
+    return retold(
+        steps, lambda share: Progress((tile + share) / tiles, f"fitting tile {tile + 1} of {tiles}")
+    )
 
 
 def _placed(scene: bpy.types.Scene, folder: Path, place: Path) -> Steps:

@@ -26,7 +26,7 @@ from ..capture.capture import plan_of, render_tile, set_tile
 from ..capture.check import check_scene
 from ..capture.planned import Given
 from ..capture.stream import Stream
-from ..work import Progress, Steps
+from ..work import Progress, Steps, retold
 from .job import PART_HEADER, Job, Part, estimate
 
 
@@ -162,9 +162,4 @@ def _fitted(captured: CaptureSet, part: Part, folder: Path, files: list[str]) ->
     rendered.folder = folder
     rendered.files[part.tile] = files
     steps = fit_into(rendered, part.tile, folder / Stream.FIELD)
-    while True:
-        try:
-            share = next(steps)
-        except StopIteration as end:
-            return end.value
-        yield Progress(0.5 + share / 2, f"fitting {part.name}")
+    return retold(steps, lambda share: Progress(0.5 + share / 2, f"fitting {part.name}"))

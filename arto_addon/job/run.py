@@ -16,7 +16,6 @@ import time
 import traceback
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -24,18 +23,10 @@ import numpy as np
 from ...core.errors import ArtoError, CancelledError, SceneError
 from ..blender import devices
 from ..blender.compositing import places_of_groups
-from ..capture.capture import capture
-from ..capture.sequence import capture_frames
-from ..fit.fit import fit
-from ..plate.composite import save_composite
-from ..plate.verify import verify_plate
-from ..relight.looks import relight_looks
-from ..relight.many import frames_of, relight_many
-from ..relight.relight import compute
-from ..shoot import shoot
 from ..shot import home
-from ..work import STOPPED, Progress, Render, run
+from ..work import STOPPED, Progress, Render, Steps, run
 from .task import State, Task
+from .verbs import VERBS
 
 CANCEL = "cancel\n"
 # Seconds that a render is given to end by itself once it was told to.
@@ -72,7 +63,7 @@ def main(path: Path) -> int:
     return code
 
 
-def _steps(task: Task, folder: Path) -> Any:
+def _steps(task: Task, folder: Path) -> Steps:
     home.set_file(task.blend)
     scene = bpy.data.scenes.get(task.scene)
     if scene is None:
@@ -87,20 +78,7 @@ def _steps(task: Task, folder: Path) -> Any:
             raise SceneError(f"the painted image '{painted.name}' is not in the copy of the file")
         image.pixels.foreach_set(np.load(folder / painted.pixels))
         image.update()
-    if task.verb == "capture_frames":
-        return capture_frames(scene, task.view_layer, frames_of(scene))
-    if task.verb == "relight_frames":
-        return relight_many(scene, task.view_layer, frames=frames_of(scene))
-    work = {
-        "capture": capture,
-        "fit": fit,
-        "relight": compute,
-        "shoot": shoot,
-        "relight_looks": relight_looks,
-        "verify": verify_plate,
-        "composite": save_composite,
-    }[task.verb]
-    return work(scene, task.view_layer)
+    return VERBS[task.verb].steps(scene, task.view_layer)
 
 
 def _turn_paths(folder: Path) -> None:
@@ -111,7 +89,9 @@ def _turn_paths(folder: Path) -> None:
     trees = [
         t for m in (*bpy.data.materials, *bpy.data.worlds, *bpy.data.lights) if (t := m.node_tree)
     ]
-    owners: list[Any] = [n for tree in (*trees, *places_of_groups()) for n in tree.nodes]
+    owners: list[bpy.types.bpy_struct] = [
+        n for tree in (*trees, *places_of_groups()) for n in tree.nodes
+    ]
     owners += [m for o in bpy.data.objects for m in o.modifiers]
     for owner in owners:
         for prop in owner.bl_rna.properties:
@@ -168,7 +148,7 @@ class _Writer:
             raise CancelledError(STOPPED)
         self._render = step if isinstance(step, Render) else None
         said = self.text
-        self.share, self.text = step.share, step.text
+        self.share, self.text = min(step.share, 1.0), step.text
         if self._render and self._first is None:
             # what was there already took no time
             self._first = time.monotonic(), step.share
@@ -193,11 +173,11 @@ class _Writer:
     def samples(self) -> Iterator[None]:
         """Follow the samples of the renders."""
 
-        def told(*arguments: Any) -> None:
+        def told(*arguments: object) -> None:
             found = _SAMPLE.search(str(arguments[0])) if arguments else None
             if found and self._render:
                 part = int(found[1]) / max(int(found[2]), 1)
-                self.share = self._render.share + self._render.span * min(part, 1.0)
+                self.share = min(self._render.share + self._render.span * min(part, 1.0), 1.0)
                 self._write()
 
         bpy.app.handlers.render_stats.append(told)

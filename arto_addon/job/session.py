@@ -20,7 +20,7 @@ from pathlib import Path
 import bpy
 from bpy.app.handlers import persistent
 
-from ...core.errors import BusyError, SceneError
+from ...core.errors import ArtoError, BusyError, SceneError
 from ...core.files import Lock
 from ...core.units import clock
 from ..blender.quitting import not_when_quitting, when_quitting
@@ -29,20 +29,10 @@ from ..shot.shot import shot_of
 from . import snapshot
 from .run import CANCEL, PATIENCE
 from .task import State
+from .verbs import VERBS, Verb
 
 # How often the window looks how far the job is.
 EVERY = 0.2
-DOING = {
-    "capture": "capturing",
-    "fit": "fitting",
-    "relight": "relighting",
-    "capture_frames": "capturing the frames of",
-    "relight_frames": "relighting the frames of",
-    "shoot": "capturing",
-    "relight_looks": "relighting the looks of",
-    "verify": "verifying the plate of",
-    "composite": "compositing",
-}
 LOG = "log.txt"
 
 
@@ -52,13 +42,13 @@ class Outcome:
 
     level: str
     text: str
-    verb: str = ""
+    verb: Verb | None = None
 
 
 class Job:
     """A job that runs: a Blender of its own on a snapshot in a folder of its own."""
 
-    def __init__(self, verb: str, scene: bpy.types.Scene, view_layer: str) -> None:
+    def __init__(self, verb: Verb, scene: bpy.types.Scene, view_layer: str) -> None:
         """Take the snapshot and start. Raises SceneError, BusyError; then nothing is left."""
         self.verb = verb
         self.begun = time.monotonic()
@@ -71,9 +61,7 @@ class Job:
         self.blend = bpy.data.filepath
         self.light = scene.arto.look.strip()
         _remove_leftovers(claimed)
-        if not verb.startswith(("relight", "verify", "composite")) and (
-            holder := Lock.holder(claimed)
-        ):
+        if VERBS[verb].captures and (holder := Lock.holder(claimed)):
             raise BusyError(
                 f"{claimed} is in use: {holder}; wait until it is done, or end it there"
             )
@@ -101,7 +89,11 @@ class Job:
     def look(self) -> bool:
         """Whether it still runs; `state` is then how far it is, else how it ended."""
         running = self.process.poll() is None
-        found = State.read(self.folder)
+        try:
+            found = State.read(self.folder)
+        except ArtoError as e:
+            # while the job runs it writes another one soon
+            found = self.state if running else State(self.state.share, str(e), end="failed")
         if running:
             self.state = found if not found.end else self.state
             if self.told and time.monotonic() - self.told > PATIENCE + 4:
@@ -179,15 +171,15 @@ def _remove_leftovers(claimed: Path) -> None:
 current: Job | None = None
 outcome: Outcome | None = None
 # What is done in the window with what a job has made, by verb.
-finishers: dict[str, Callable[[Job], str]] = {}
+finishers: dict[Verb, Callable[[Job], str]] = {}
 
 
 def busy() -> str:
     """What runs, in words for a button that has to wait; empty where nothing does."""
-    return f"ARTO is {DOING[current.verb]} {current.title}" if current else ""
+    return f"ARTO is {VERBS[current.verb].doing} {current.title}" if current else ""
 
 
-def start(verb: str, scene: bpy.types.Scene, view_layer: str) -> Job:
+def start(verb: Verb, scene: bpy.types.Scene, view_layer: str) -> Job:
     """Start a job. Raises BusyError where one runs, SceneError; the window goes on."""
     global current, outcome
     if current:

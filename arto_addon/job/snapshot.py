@@ -16,12 +16,13 @@ import numpy as np
 from ...core.errors import SceneError
 from ..blender import devices
 from .task import Painted, Task
+from .verbs import Verb
 
 # Not empty while a snapshot is saved: for who does something before a file of the artist's is.
 taking: list[bool] = []
 
 
-def take(folder: Path, verb: str, scene: bpy.types.Scene, view_layer: str) -> tuple[Path, Path]:
+def take(folder: Path, verb: Verb, scene: bpy.types.Scene, view_layer: str) -> tuple[Path, Path]:
     """Save the snapshot and its task into `folder` -> (.blend, task). Raises SceneError.
 
     Nothing of the artist's changes: not the file's name, nor whether it has unsaved changes.

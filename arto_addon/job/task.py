@@ -7,24 +7,31 @@ each time.
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field
+import math
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Literal, get_args
 
+from ...core.description import Description
 from ...core.errors import ArtoError
 from ...core.files import write_text
+from ..blender.devices import Devices
+from .verbs import VERBS, Verb
 
 TASK = "task.json"
 PROGRESS = "progress.json"
-VERBS = (
-    "capture", "fit", "relight", "capture_frames", "relight_frames", "shoot", "relight_looks",
-    "verify", "composite",
-)  # fmt: skip
+
+# How a job ended; empty while it runs.
+End = Literal["", "done", "cancelled", "failed"]
 
 
 @dataclass(frozen=True)
 class Painted:
-    """An image whose pixels are in no file: they are beside the snapshot, as `pixels`, .npy."""
+    """An image whose pixels are in no file.
+
+    library: the path of the library that the image is of, empty where it is of none; pixels: the
+    name of the .npy beside the snapshot.
+    """
 
     name: str
     library: str
@@ -33,14 +40,17 @@ class Painted:
 
 @dataclass(frozen=True)
 class Task:
-    """verb: one of `VERBS`; blend: the artist's file, empty where it was never saved; devices: the
-    artist's render devices, as Cycles' preferences have them; painted: see `Painted`."""
+    """What a job is to do.
 
-    verb: str
+    blend: the artist's file, empty where it was never saved; devices: the artist's render devices,
+    None where Cycles is switched off; painted: images whose pixels are in no file.
+    """
+
+    verb: Verb
     scene: str
     view_layer: str
     blend: str
-    devices: dict[str, Any] = field(default_factory=dict)
+    devices: Devices | None = None
     painted: tuple[Painted, ...] = ()
 
     def write(self, folder: Path) -> Path:
@@ -50,29 +60,58 @@ class Task:
 
     @staticmethod
     def read(path: Path) -> Task:
-        """Raises ArtoError for a file that is no task."""
-        try:
-            data = json.loads(path.read_text(encoding="utf-8"))
-            painted = tuple(Painted(**p) for p in data.pop("painted"))
-            return Task(**data, painted=painted)
-        except (OSError, ValueError, TypeError, KeyError, AttributeError) as e:
-            raise ArtoError(f"{path} is no task of ARTO's ({e!r})") from e
+        """Read a task. Raises ArtoError for a file that is none."""
+        said = Description(path, _no_task)
+        said.only("verb", "scene", "view_layer", "blend", "devices", "painted")
+        return Task(
+            said.choice("verb", VERBS),
+            said.text("scene"),
+            said.text("view_layer"),
+            said.text("blend"),
+            _devices(said),
+            tuple(_painted(said, entry) for entry in said.kind("painted", list, [])),
+        )
+
+
+def _devices(said: Description) -> Devices | None:
+    found = said.kind("devices", dict)
+    if found is None:
+        return None
+    said.only("kind", "use", where=found)
+    use = found.get("use")
+    if not isinstance(use, dict) or not all(isinstance(used, bool) for used in use.values()):
+        raise said.wrong("use", use)
+    return Devices(said.text("kind", found), use)
+
+
+def _painted(said: Description, entry: object) -> Painted:
+    if not isinstance(entry, dict):
+        raise said.wrong("painted", entry)
+    said.only("name", "library", "pixels", where=entry)
+    return Painted(
+        said.text("name", entry),
+        said.text("library", entry),
+        said.file_name(entry.get("pixels"), "pixels"),
+    )
+
+
+def _no_task(text: str) -> ArtoError:
+    return ArtoError(f"{text}: it is no task of this version of ARTO; start the work again")
 
 
 @dataclass(frozen=True)
 class State:
     """How far a job is.
 
-    share: 0 to 1; left: seconds, None while nobody knows; end: empty while it runs, then `done`,
-    `cancelled` or `failed`; text: what it is doing, or how it ended; result: the file or folder
-    that it made.
+    share: how much is done, 0 to 1; spent: seconds; left: seconds, None while nobody knows; text:
+    what it is doing, or how it ended; result: the file or folder that it made.
     """
 
     share: float = 0.0
     text: str = "starting"
     spent: float = 0.0
     left: float | None = None
-    end: str = ""
+    end: End = ""
     result: str = ""
 
     def write(self, folder: Path) -> None:
@@ -80,8 +119,22 @@ class State:
 
     @staticmethod
     def read(folder: Path) -> State:
-        """The last one written; the first one where there is none yet."""
-        try:
-            return State(**json.loads((folder / PROGRESS).read_text(encoding="utf-8")))
-        except (OSError, ValueError, TypeError):
+        """The last state written, the first one where none is yet. Raises ArtoError for a file that
+        is none."""
+        if not (folder / PROGRESS).exists():
             return State()
+        said = Description(folder / PROGRESS, _no_state)
+        said.only("share", "text", "spent", "left", "end", "result")
+        left = None if said.data.get("left") is None else said.number("left", 0.0, 0.0, math.inf)
+        return State(
+            said.number("share", 0.0, 0.0, 1.0),
+            said.text("text"),
+            said.number("spent", 0.0, 0.0, math.inf),
+            left,
+            said.choice("end", get_args(End)),
+            said.text("result"),
+        )
+
+
+def _no_state(text: str) -> ArtoError:
+    return ArtoError(f"{text}: how far the work is cannot be told; start it again")

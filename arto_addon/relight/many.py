@@ -19,7 +19,7 @@ from ..capture.sequence import frame_kept
 from ..plate.present import present_frames
 from ..shot import paths
 from ..shot.shot import check_same_shot, shot_of
-from ..work import Progress, Steps
+from ..work import Progress, Render, Steps, retold
 from ..world.check import check_world
 from .relight import finish, make_ready
 from .shown import Light, Ready, Shown
@@ -84,16 +84,14 @@ def relight_many(
 
 def _quietly(steps: Steps, share: float) -> Steps:
     """The steps but for what they say: said once for all, it would be lost among them."""
-    try:
-        while True:
-            step = next(steps)
-            if not isinstance(step, Progress):
-                step.share = share
-                yield step
-    except StopIteration as end:
-        return end.value
-    finally:
-        steps.close()
+
+    def change(step: Progress | Render) -> Render | None:
+        if isinstance(step, Progress):
+            return None
+        step.share = share
+        return step
+
+    return retold(steps, change)
 
 
 def _lent(

@@ -14,6 +14,7 @@ import bpy
 
 from ...core.errors import ArtoError, CancelledError, SceneError
 from ..job import session
+from ..job.verbs import Verb
 from ..shot.shot import layer_of
 from ..work import Progress, ProgressLines, Render, Steps, last_properties_kept, run
 from .preferences import run_here
@@ -27,7 +28,7 @@ TICK = 0.05
 class LongWork(bpy.types.Operator):
     """See the module. `verb` names the work for a job, `steps` is it."""
 
-    verb = ""
+    verb: Verb
 
     def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
         raise NotImplementedError

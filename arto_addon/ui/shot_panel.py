@@ -7,6 +7,7 @@ import bpy
 from ...core.units import clock
 from ..job import session
 from ..job.session import Job
+from ..job.verbs import Verb
 from ..shot import status
 from ..stage.settings import looks_otherwise, samples_of
 from ..stage.stage import picture_size
@@ -101,7 +102,7 @@ def running(column: bpy.types.UILayout, context: bpy.types.Context, job: Job) ->
     say(column, context, " " if left is None else tr("{left} left", left=clock(left)))
 
 
-def ended(column: bpy.types.UILayout, context: bpy.types.Context, verbs: tuple[str, ...]) -> None:
+def ended(column: bpy.types.UILayout, context: bpy.types.Context, verbs: tuple[Verb, ...]) -> None:
     """How the last piece of work ended, if it was one of these and went wrong or was stopped."""
     found = session.outcome
     if found is None or found.verb not in verbs or found.level == "INFO":

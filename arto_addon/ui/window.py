@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
 
 from ..job import session, snapshot
 from ..job.session import Job
+from ..job.verbs import Verb
 from ..live import live
 from ..plate import compare
 from ..plate.plate import name_of, show
@@ -23,7 +24,7 @@ from ..shot.status import field_of
 from ..world import own
 from .reveal import reveal
 
-_keys: list[tuple[Any, Any]] = []
+_keys: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
 
 
 def _scene_of(job: Job) -> bpy.types.Scene | None:
@@ -106,7 +107,7 @@ def _before_save(*_: object) -> None:
             live.current._wished = ()
 
 
-_FINISHERS = {
+_FINISHERS: dict[Verb, Callable[[Job], str]] = {
     "relight": show_relit,
     "relight_frames": show_relit,
     "relight_looks": show_looks,

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
+from arto.arto_addon.blender import devices
+from arto.arto_addon.blender.devices import Devices
 from arto.arto_addon.job import run, snapshot
-from arto.arto_addon.job.task import State, Task
+from arto.arto_addon.job.task import Painted, State, Task
 from arto.arto_addon.shot import home
 from arto.arto_addon.shot.fingerprint import changes, fingerprint
-from arto.core.errors import ArtoError
+from arto.arto_addon.work import driven, retold
+from arto.core.errors import ArtoError, CancelledError, SceneError
 from arto.core.units import clock
 from scene_tools import add_mesh, small_scene
 
@@ -109,17 +113,106 @@ def test_caches_beside_the_file_are_there(tmp_path, back):
 
 
 def test_a_task_and_a_state_come_back(tmp_path):
-    task = Task("fit", "Scene", "ViewLayer", "/a/b.blend", {"kind": "NONE", "use": {"CPU": True}})
+    devices = Devices("NONE", {"CPU": True})
+    painted = (Painted("Wood", "//wood.blend", "painted_1.npy"),)
+    task = Task("fit", "Scene", "ViewLayer", "/a/b.blend", devices, painted)
     assert Task.read(task.write(tmp_path)) == task
+    bare = Task("shoot", "Scene", "ViewLayer", "")
+    assert Task.read(bare.write(tmp_path)) == bare
     state = State(0.5, "text", 3.0, 4.0)
     state.write(tmp_path)
     assert State.read(tmp_path) == state
-    (tmp_path / "progress.json").write_text("{")
+    (tmp_path / "progress.json").unlink()
     assert State.read(tmp_path) == State()
-    for text in ("{", "[]", "{}", '{"painted": [{"no": 1}]}'):
-        (tmp_path / "task.json").write_text(text)
-        with pytest.raises(ArtoError, match="no task"):
-            Task.read(tmp_path / "task.json")
+
+
+@pytest.mark.parametrize(
+    ("where", "name", "value"),
+    [
+        ((), "verb", "burn"),
+        ((), "verb", None),
+        ((), "scene", 3),
+        ((), "blend", ["/a/b.blend"]),
+        ((), "devices", "CPU"),
+        ((), "painted", {}),
+        ((), "painted", ["Wood"]),
+        ((), "extra", 1),
+        (("devices",), "kind", None),
+        (("devices",), "use", {"CPU": 1}),
+        (("devices",), "use", ["CPU"]),
+        (("devices",), "more", 1),
+        (("painted", 0), "name", None),
+        (("painted", 0), "pixels", "../../elsewhere.npy"),
+        (("painted", 0), "more", 1),
+    ],
+)
+def test_what_a_task_cannot_be_is_said(tmp_path, where, name, value):
+    painted = (Painted("Wood", "", "painted_1.npy"),)
+    task = Task("fit", "Scene", "Layer", "", Devices("NONE", {"CPU": True}), painted)
+    path = task.write(tmp_path)
+    data = json.loads(path.read_text())
+    part = data
+    for step in where:
+        part = part[step]
+    part[name] = value
+    path.write_text(json.dumps(data))
+    with pytest.raises(ArtoError, match=f"'{name}'.*no task .* start the work again"):
+        Task.read(path)
+
+
+@pytest.mark.parametrize("text", ["{", "[]", "{}", "\xff"])
+def test_a_file_that_is_no_task_is_said(tmp_path, text):
+    (tmp_path / "task.json").write_text(text, encoding="latin-1")
+    with pytest.raises(ArtoError, match=r"task\.json .*no task"):
+        Task.read(tmp_path / "task.json")
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("share", 1.1), ("share", "0.5"), ("spent", -1.0), ("left", -1), ("end", "over"), ("text", 3),
+     ("result", None), ("extra", 0)],
+)  # fmt: skip
+def test_what_a_state_cannot_be_is_said(tmp_path, name, value):
+    State(0.5, "text", 3.0, 4.0, "done", "/a/plate.exr").write(tmp_path)
+    path = tmp_path / "progress.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {name: value}))
+    with pytest.raises(ArtoError, match=f"'{name}'.*start it again"):
+        State.read(tmp_path)
+
+
+def test_devices_of_a_kind_that_is_not_here_are_said():
+    there = devices.chosen()
+    devices.use(there)
+    assert devices.chosen() == there
+    with pytest.raises(SceneError, match="NOTHING"):
+        devices.use(Devices("NOTHING", {}))
+    assert devices.chosen() == there
+
+
+def test_work_is_told_and_driven_to_what_it_makes():
+    closed = []
+
+    def work():
+        try:
+            yield from range(5)
+        finally:
+            closed.append(True)
+        return "made"
+
+    seen = []
+    assert driven(retold(work(), lambda n: None if n % 2 else n * 10), seen.append) == "made"
+    assert seen == [0, 20, 40] and closed == [True]
+    some = retold(work(), lambda n: n)
+    assert next(some) == 0
+    some.close()
+    assert closed == [True, True]
+
+    def stop(_):
+        raise CancelledError("enough")
+
+    with pytest.raises(CancelledError):
+        driven(work(), stop)
+    assert closed == [True, True, True]
 
 
 def test_times_in_few_words():

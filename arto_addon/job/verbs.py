@@ -1,0 +1,66 @@
+"""What a job can do: one table of its verbs, for the window that starts a job and for the job."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import bpy
+
+from ..capture.capture import capture
+from ..capture.sequence import capture_frames
+from ..fit.fit import fit
+from ..plate.composite import save_composite
+from ..plate.verify import verify_plate
+from ..relight.looks import relight_looks
+from ..relight.many import frames_of, relight_many
+from ..relight.relight import compute
+from ..shoot import shoot
+from ..work import Steps
+
+Verb = Literal[
+    "capture",
+    "fit",
+    "relight",
+    "capture_frames",
+    "relight_frames",
+    "shoot",
+    "relight_looks",
+    "verify",
+    "composite",
+]
+
+
+@dataclass(frozen=True)
+class Work:
+    """What a verb stands for.
+
+    steps: the work on a scene and a view layer; doing: what the artist is told, before the shot's
+    title; captures: whether the work changes what was captured, so that nobody else may.
+    """
+
+    steps: Callable[[bpy.types.Scene, str], Steps]
+    doing: str
+    captures: bool = False
+
+
+def _capture_frames(scene: bpy.types.Scene, view_layer: str) -> Steps:
+    return capture_frames(scene, view_layer, frames_of(scene))
+
+
+def _relight_frames(scene: bpy.types.Scene, view_layer: str) -> Steps:
+    return relight_many(scene, view_layer, frames=frames_of(scene))
+
+
+VERBS: Mapping[Verb, Work] = {
+    "capture": Work(capture, "capturing", captures=True),
+    "fit": Work(fit, "fitting", captures=True),
+    "relight": Work(compute, "relighting"),
+    "capture_frames": Work(_capture_frames, "capturing the frames of", captures=True),
+    "relight_frames": Work(_relight_frames, "relighting the frames of"),
+    "shoot": Work(shoot, "capturing", captures=True),
+    "relight_looks": Work(relight_looks, "relighting the looks of"),
+    "verify": Work(verify_plate, "verifying the plate of"),
+    "composite": Work(save_composite, "compositing"),
+}
