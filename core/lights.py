@@ -74,7 +74,7 @@ class Lights:
             bits = model.bits[model.rows[block, some[0]] :][: len(some) * row // 8]
             places = np.flatnonzero(np.unpackbits(bits).view(bool))
             if len(places) != at.stop - at.start:
-                raise FieldError(f"{self.tile.folder} is damaged, its counts differ: fit again")
+                raise FieldError(f"{model.path} is damaged, its counts differ: fit again")
             if p * len(some) * row > room.size:  # one patch of a block, larger than usual
                 room = np.empty(p * len(some) * row, np.float32)
             dense = room[: p * len(some) * row].reshape(p, len(some) * row)

@@ -18,6 +18,7 @@ from arto.arto_addon.shot import paths
 from arto.arto_addon.stage.stage import stage
 from arto.core import exr
 from arto.core.field.field import Field
+from arto.core.field.tile_file import TileFile
 from scene_tools import captured, hdri, small_scene, smooth
 
 
@@ -78,8 +79,13 @@ def planned_job(
 
 
 def arrays(folder: Path) -> dict[str, np.ndarray]:
-    """All that a field has, or several, by the names of its files."""
-    return {str(p.relative_to(folder)): np.load(p) for p in folder.rglob("*.npy")}
+    """All that a field has, or several, by the names of its files and of their arrays."""
+    found = {p: TileFile(p) for p in sorted(folder.rglob("*.arto"))}
+    return {
+        str(p.relative_to(folder) / name): tile.load(name).copy()
+        for p, tile in found.items()
+        for name in tile.sizes
+    }
 
 
 def assert_same(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> None:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from arto.core import exr
+from arto.core.field.tile_file import TileFile
 from program_tools import MAKE_CATCHER, Program, said
 
 # One machine, with the tiles that the job has.
@@ -41,7 +42,8 @@ bpy.ops.wm.save_as_mainfile(filepath=sys.argv[-1])
 
 def arrays(folder: Path) -> dict[str, np.ndarray]:
     (field,) = folder.rglob("field/field.json")
-    return {str(p.relative_to(field.parent)): np.load(p) for p in field.parent.rglob("*.npy")}
+    found = {str(p.relative_to(field.parent)): TileFile(p) for p in field.parent.rglob("*.arto")}
+    return {f"{p}/{name}": t.load(name).copy() for p, t in found.items() for name in t.sizes}
 
 
 def test_an_openjd_job_is_what_one_machine_makes(

@@ -138,7 +138,9 @@ def _take(
         seeds.append([told["samples"], names])
         if fitted := told.get("fitted"):
             entry["fitted"] = fitted
-            _take_field(source / Stream.FIELD, folder / Stream.FIELD, fitted["folder"])
+            # a part that was fitted by the version before has a folder for a tile
+            name = fitted.get("file") or fitted["folder"]
+            _take_field(source / Stream.FIELD, folder / Stream.FIELD, name)
     entry["files"] = [name for _, names in seeds for name in names]
     if len(seeds) > 1:
         entry["seeds"] = seeds
@@ -151,9 +153,10 @@ def _take_field(source: Path, field: Path, name: str) -> None:
         (source, field),
         *((proxy_folder(source, f), proxy_folder(field, f)) for f in FACTORS),
     ]:
-        if (here / name).is_dir():
+        if (here / name).exists():
             there.mkdir(parents=True, exist_ok=True)
-            shutil.rmtree(there / name, ignore_errors=True)
+            if (there / name).is_dir():
+                shutil.rmtree(there / name)
             (here / name).replace(there / name)
 
 

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.field.field import Field
-from ...core.field.tile_writer import write_layer
-from ...core.field.writer import write_head
+from ...core.field.writer import replace_layers, write_head
 from ..blender import denoise
 from ..work import Progress, Steps
 
@@ -47,8 +46,7 @@ def cleaned(scene: bpy.types.Scene, folder: Path) -> Steps:
         # a normal is from -1 to 1, and a denoiser of pictures knows nothing below 0
         low, span = (-1.0, 2.0) if name == "normal" else (0.0, 1.0)
         noisy = ((pixels - low) / span).astype(np.float32)
-        better = denoise.denoise({}, noisy, like=scene) * span + low
-        for tile in field.tiles:
-            write_layer(tile.folder, name, better[tile.region.slices])
+        guides[name] = denoise.denoise({}, noisy, like=scene) * span + low
+    replace_layers(field, guides)
     field.head["about"]["guides"] = CLEAN
     write_head(folder, field.head)

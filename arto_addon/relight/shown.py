@@ -75,10 +75,15 @@ class Shown:
         self._split: tuple[NDArray[np.float32], Split] | None = None
         self._filmed: tuple[tuple[int, float], tuple[str, NDArray[np.float32]]] | None = None
         self.held = self.field.about.get("route") == SAMPLED
-        # of a shot with shadow catchers: of everything, of the catchers, of the things
-        self.takes = [self]
+        self._others: list[Shown] = []
         if self.field.about.get("catchers") and not self.field.about.get("take"):
-            self.takes += [self._beside(folder.parent / name / "field") for name in takes.TAKES]
+            self._others = [self._beside(folder.parent / name / "field") for name in takes.TAKES]
+
+    @property
+    def takes(self) -> list[Shown]:
+        """Of a shot with shadow catchers: of everything, of the catchers, of the things."""
+        # made when it is asked for: kept, it would be a circle that keeps fields mapped
+        return [self, *self._others]
 
     def _beside(self, folder: Path) -> Shown:
         """Another take of the shot. Raises FieldError."""
@@ -93,10 +98,9 @@ class Shown:
     def pictures(self, lights: Sequence[PatchLight]) -> list[list[NDArray[np.float32]]]:
         """For each light what each take's field shows in it, (H, W, 4)."""
         # the first two are divided by each other
-        cut = [len(self.takes) > 1 and take is not self.takes[-1] for take in self.takes]
-        found = [
-            relights(t.field, lights, 0.0, cut=c) for t, c in zip(self.takes, cut, strict=True)
-        ]
+        takes = self.takes
+        cut = [len(takes) > 1 and take is not takes[-1] for take in takes]
+        found = [relights(t.field, lights, 0.0, cut=c) for t, c in zip(takes, cut, strict=True)]
         return [list(each) for each in zip(*found, strict=True)]
 
     def changed(self) -> list[str]:

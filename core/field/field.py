@@ -1,7 +1,7 @@
 """The reflectance field on disk: for every pixel and patch a coefficient and a support (paper 5).
 
-A folder: `field.json` says in words what it holds, and each tile is a folder of .npy arrays that
-are mapped, not read, until they are used. docs/field-format.md says enough to write a reader.
+A folder: `field.json` says in words what it holds, and each tile is a file of arrays that are
+mapped, not read, until they are used. docs/field-format.md says enough to write a reader.
 """
 
 from __future__ import annotations
@@ -16,12 +16,14 @@ from ..description import Description
 from ..errors import FieldError, HemicubeError
 from ..hemicube import Hemicube
 from ..region import Region
-from .tile import OTHERS, Tile
+from .tile import OTHERS, SUFFIX, Tile
 
-VERSION = 2
+VERSION = 3
+# In fields of the version before, a tile is a folder (see `tile_folder`).
+READ = (2, 3)
 HEADER = "field.json"
 # The arrays of a support model.
-_OF_A_MODEL = ("coefficient", "parameters", "pixels", "counts")
+OF_A_MODEL = ("coefficient", "parameters", "pixels", "counts")
 # What others ask a field's `about` for.
 _ABOUT: dict[str, type | tuple[type, ...]] = {
     "shot": dict, "fingerprint": dict, "view_layer": str, "key": str, "route": str, "choice": str,
@@ -52,7 +54,7 @@ class Field:
         if "version" not in said.data:
             raise said.error(f"{path} cannot be read (it has no version)")
         version = said.data["version"]
-        if type(version) is not int or version != VERSION:
+        if type(version) is not int or version not in READ:
             raise FieldError(
                 f"{folder} is a field of version {version!s:.20}; this ARTO reads version "
                 f"{VERSION}: fit again from the capture set"
@@ -65,7 +67,10 @@ class Field:
         patches = len(self.hemicube)
         self.tiles = []
         for region, entry in said.tiles():
-            name = said.file_name(entry.get("folder"), "folder")
+            kind = "folder" if "folder" in entry else "file"
+            name = said.file_name(entry.get(kind), kind)
+            if (kind == "file") != name.endswith(SUFFIX):
+                raise said.wrong(kind, name)
             used = entry.get("entries")
             if not isinstance(used, dict):
                 raise said.wrong("entries", used)
@@ -81,6 +86,17 @@ class Field:
         things = about.get("fingerprint") or {}
         if any(not isinstance(text, str) for text in things.values()):
             raise said.wrong("fingerprint", things)
+
+    def __enter__(self) -> Field:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let go of all files of the field, see `Tile.close`: until then Windows replaces none."""
+        for tile in self.tiles:
+            tile.close()
 
     @property
     def about(self) -> dict[str, Any]:
@@ -117,9 +133,8 @@ class Field:
 
     def bytes_per_pixel(self) -> float:
         """What relighting reads: coefficients, supports and codes, on disk."""
-        names = [f"{n}_{w}" for n in self.shares() for w in _OF_A_MODEL]
-        files = [t.folder / f"{name}.npy" for t in self.tiles for name in [*names, *OTHERS]]
-        size = sum(f.stat().st_size for f in files if f.is_file())
+        names = {f"{n}_{w}" for n in self.shares() for w in OF_A_MODEL} | {*OTHERS}
+        size = sum(n for t in self.tiles for name, n in t.sizes.items() if name in names)
         return size / max(sum(t.region.pixels for t in self.tiles), 1)
 
     def has_layer(self, name: str) -> bool:

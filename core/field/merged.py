@@ -34,10 +34,10 @@ class _Entries:
 
 
 class MergedModel:
-    """The entries of one support model, as `field_tile.Model` has them."""
+    """The entries of one support model, as `tile.Model` has them."""
 
     def __init__(self, support: Support, found: list[list[_Entries | None]], like: Model) -> None:
-        self.support, self.end = support, like.end
+        self.path, self.support, self.end = like.path, support, like.end
         patches = len(found[0])
         self.counts = np.array(
             [[len(e.pixels) if e else 0 for e in block] for block in found], np.uint32
@@ -65,7 +65,7 @@ class MergedModel:
 
 
 class MergedTile:
-    """All of a field, as `field_tile.Tile` has a part of it."""
+    """All of a field, as `tile.Tile` has a part of it."""
 
     def __init__(self, tiles: list[Tile]) -> None:
         first = tiles[0].region
@@ -78,6 +78,7 @@ class MergedTile:
         self.blocks: list[slice] = []
         self._layers: dict[str, NDArray[np.float32]] = {}
         self._tiles = tiles
+        self._names = set(tiles[0].sizes).intersection(*(t.sizes for t in tiles))
         begin = 0
         for group in groups:
             end = begin + sum(tiles[i].region.pixels for i in group)
@@ -96,6 +97,8 @@ class MergedTile:
             size = [float(t.rest().sum(dtype=np.float64)) + 1e-12 for t in tiles]
             weights = [cast(NDArray, t.rest_weights) for t in tiles]
             self.rest_weights = np.average(weights, axis=0, weights=size).astype(np.float32)
+        # all but the layers is in memory now
+        self.close()
 
     def _merged(self, groups: list[list[Tile]]) -> list[MergedModel]:
         names = sorted({m.support.code for g in groups for t in g for m in t.models})
@@ -132,16 +135,22 @@ class MergedTile:
     ) -> NDArray[np.float32]:
         if name not in self._layers:
             self._layers[name] = np.concatenate([t.layer(name) for t in self._tiles])
+            self.close()
         return self._layers[name][part]
 
     def has_layer(self, name: str) -> bool:
-        return all(t.has_layer(name) for t in self._tiles)
+        return name in self._names
 
     def own_layers(self) -> list[str]:
-        return self._tiles[0].own_layers()
+        return [name for name in self._names if name.startswith("own_")]
 
     def open(self) -> None:
         """It is."""
+
+    def close(self) -> None:
+        """Let go of the files of the tiles."""
+        for tile in self._tiles:
+            tile.close()
 
 
 def _joined(parts: list[_Entries]) -> _Entries | None:

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from ..errors import FieldError
 from ..region import Region
 from ..supports import BY_CODE, NOTHING, REST, Support
+from .tile_file import TileFile
+from .tile_folder import TileFolder
 
 # The arrays of a tile stand block after block: so many pixels at a time, row by row. A block is
 # what a thread adds up and what a crop reads; whole bytes of bits.
@@ -26,6 +28,8 @@ FULL = 255
 # Where half floats are relative to a largest value, that is at their upper end: nine decades below
 # it keep their precision.
 LARGEST = 6e4
+# What the file of a tile ends in.
+SUFFIX = ".arto"
 # Beside the models' arrays, what relighting reads.
 OTHERS = ("peaks", "scales", "rest", "rest_weights", "rest_patches")
 
@@ -61,13 +65,14 @@ class Model:
     """
 
     def __init__(self, tile: Tile, support: Support, count: int) -> None:
-        self.tile, self.support = tile, support
+        # not the tile itself: it has its models, and a circle would keep its file mapped
+        self.path, self.blocks, self.support = tile.path, tile.blocks, support
         name, p = support.name, len(support.parameters)
         blocks = tile.blocks
         counts = tile.load(f"{name}_counts", (len(blocks), tile.patches), np.uint32)
         lengths = np.array([b.stop - b.start for b in blocks])[:, None]
         if (counts > lengths).any() or counts.sum(dtype=np.int64) != count:
-            raise FieldError(f"{tile.folder} is damaged, its counts differ: fit again")
+            raise FieldError(f"{tile.path} is damaged, its counts differ: fit again")
         self.counts = counts
         self.starts = _starts(counts)
         row = np.where(counts > 0, -(-lengths // 8), 0)
@@ -88,14 +93,14 @@ class Model:
 
     def pixels(self, block: int, k: int) -> NDArray[np.intp]:
         """Their pixels, counted from the block's first."""
-        where = self.tile.blocks[block]
+        where = self.blocks[block]
         n = where.stop - where.start
         first = self.rows[block, k]
         found = np.flatnonzero(
             np.unpackbits(self.bits[first : first + -(-n // 8)], count=n).view(bool)
         )
         if len(found) != self.counts[block, k]:
-            raise FieldError(f"{self.tile.folder} is damaged, its counts differ: fit again")
+            raise FieldError(f"{self.path} is damaged, its counts differ: fit again")
         return found
 
     def shares(self, at: slice) -> NDArray[np.float32]:
@@ -118,44 +123,68 @@ def _starts(sizes: NDArray) -> NDArray[np.int64]:
 
 
 class Tile:
-    """One tile of an opened field; arrays stay on disk until asked for."""
+    """One tile of an opened field; arrays stay on disk until asked for.
 
-    def __init__(self, folder: Path, region: Region, used: dict[str, int], patches: int) -> None:
-        self.folder, self.region, self.used, self.patches = folder, region, used, patches
+    Parameters
+    ----------
+    path
+        Its file; of a field of version 2, its folder.
+    region
+        Its place in the picture.
+    used
+        By the name of each support model in use, how many entries it has.
+    patches
+        Those of the hemicube, K.
+    """
+
+    def __init__(self, path: Path, region: Region, used: dict[str, int], patches: int) -> None:
+        self.path, self.region, self.used, self.patches = path, region, used, patches
         self.blocks = blocks_of(region.pixels)
+
+    @cached_property
+    def _arrays(self) -> TileFile | TileFolder:
+        return TileFile(self.path) if self.path.suffix == SUFFIX else TileFolder(self.path)
+
+    def close(self) -> None:
+        """Let go of all that is mapped. What is asked for afterwards is mapped anew.
+
+        Arrays that were taken out of the tile keep its file mapped as long as they are there.
+        """
+        for name, kept in vars(Tile).items():
+            if isinstance(kept, cached_property):
+                self.__dict__.pop(name, None)
 
     def load(self, name: str, shape: tuple[int, ...], dtype: np.dtype | type) -> NDArray:
         """One of the tile's arrays, mapped. Raises FieldError unless it is as described."""
-        out = self._load(name)
+        out = self._arrays.load(name)
         if out.shape != shape or out.dtype != dtype:
             raise FieldError(
-                f"{self.folder / name}.npy has the shape {out.shape} of {out.dtype}, not {shape} "
-                f"of {np.dtype(dtype)}: fit again"
+                f"{self.path} is damaged, '{name}' has the shape {out.shape} of {out.dtype}, not "
+                f"{shape} of {np.dtype(dtype)}: fit again"
             )
         return out
-
-    def _load(self, name: str) -> NDArray:
-        path = self.folder / f"{name}.npy"
-        try:
-            return np.load(path, mmap_mode="r")
-        except (OSError, ValueError, EOFError) as e:
-            raise FieldError(f"{path} is missing or damaged ({e}): fit again") from e
 
     def layer(
         self, name: str, part: tuple[slice, slice] = (slice(None), slice(None))
     ) -> NDArray[np.float32]:
         """One of `field.LAYERS`, (h, w, ...), float32; part: of its rows and columns."""
-        out = self._load(name)
+        out = self._arrays.load(name)
         if out.shape[:2] != (self.region.height, self.region.width):
-            raise FieldError(f"{self.folder / name}.npy has the wrong size: fit again")
+            raise FieldError(f"{self.path} is damaged, '{name}' has the wrong size: fit again")
         return out[part].astype(np.float32)
 
+    @property
+    def sizes(self) -> dict[str, int]:
+        """The names of its arrays, and how many bytes each has on disk. Raises FieldError."""
+        return self._arrays.sizes
+
     def has_layer(self, name: str) -> bool:
-        return (self.folder / f"{name}.npy").is_file()
+        """Whether it has a layer of that name. Raises FieldError."""
+        return name in self.sizes
 
     def own_layers(self) -> list[str]:
-        """Its layers of light groups of the scene's own lamps."""
-        return [p.stem for p in self.folder.glob("own_*.npy")]
+        """Its layers of light groups of the scene's own lamps. Raises FieldError."""
+        return [name for name in self.sizes if name.startswith("own_")]
 
     @cached_property
     def models(self) -> list[Model]:
@@ -164,7 +193,7 @@ class Tile:
         for name in self.used:
             if name not in found:
                 raise FieldError(
-                    f"{self.folder} uses the support model '{name}', which this version does "
+                    f"{self.path} uses the support model '{name}', which this version does "
                     "not know: update ARTO, or fit again"
                 )
         supports = sorted((found[name] for name in self.used), key=lambda s: s.code)
@@ -173,22 +202,31 @@ class Tile:
     @cached_property
     def _scales(self) -> NDArray[np.float32]:
         """(2,): the units of `peaks` and `rest`."""
-        return np.asarray(self.load("scales", (2,), np.float32))
+        return self._numbers("scales", np.asarray(self.load("scales", (2,), np.float32)))
 
     @cached_property
     def _peaks(self) -> NDArray[np.float16]:
         return self.load("peaks", (self.region.pixels, 3), np.float16)
 
-    def ones(self, pixels: slice) -> NDArray[np.float32]:
+    def ones(self, pixels: slice | NDArray[np.intp]) -> NDArray[np.float32]:
         """(n, 3): the R whose code is 1 in each pixel."""
-        return self._peaks[pixels].astype(np.float32) * (self._scales[0] / FULL**2)
+        out = self._peaks[pixels].astype(np.float32) * (self._scales[0] / FULL**2)
+        return self._numbers("peaks", out)
+
+    def _numbers(self, name: str, array: NDArray[np.float32]) -> NDArray[np.float32]:
+        """An array, checked: light below nothing, infinite or no number would spoil pictures."""
+        # which what is no number fails too
+        if not (array.min(initial=0) >= 0 and array.max(initial=0) < np.inf):
+            raise FieldError(f"{self.path} is damaged, '{name}' has what is no light: fit again")
+        return array
 
     @cached_property
     def rest_weights(self) -> NDArray[np.float32] | None:
         """(K,): how much of each patch is in the rest of the tile; None where there is no rest."""
-        if not (self.folder / "rest.npy").is_file():
+        if "rest" not in self.sizes:
             return None
-        return np.asarray(self.load("rest_weights", (self.patches,), np.float32))
+        found = np.asarray(self.load("rest_weights", (self.patches,), np.float32))
+        return self._numbers("rest_weights", found)
 
     @cached_property
     def _rest(self) -> NDArray[np.float16]:
@@ -196,7 +234,8 @@ class Tile:
 
     def rest(self, pixels: slice = slice(None)) -> NDArray[np.float32]:
         """(n, 3): R of all that was too small to be an entry, added up."""
-        return self._rest[pixels].astype(np.float32) * self._scales[1]
+        out = self._rest[pixels].astype(np.float32) * self._scales[1]
+        return self._numbers("rest", out)
 
     @cached_property
     def rest_patches(self) -> NDArray[np.uint8]:
@@ -231,7 +270,6 @@ class Tile:
                 continue
             pixels = np.concatenate([self.blocks[b].start + model.pixels(b, k) for b in here])
             shares = np.concatenate([model.shares(model.at(b, k)).T for b in here])
-            ones = self._peaks[pixels].astype(np.float32) * (self._scales[0] / FULL**2)
             parameters = np.concatenate([model.parameters_of(model.at(b, k)) for b in here])
-            found.append(Entries(model.support, pixels, shares * ones, parameters))
+            found.append(Entries(model.support, pixels, shares * self.ones(pixels), parameters))
         return found

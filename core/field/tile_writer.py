@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
@@ -10,10 +9,10 @@ from numpy.typing import NDArray
 
 from ..capture.names import OF_ONE_RAY
 from ..errors import FieldError
-from ..files import whole
 from ..region import Region
 from ..supports import BY_CODE, NOTHING
 from .tile import FULL, LARGEST, blocks_of, steps_of
+from .tile_file import TileFileWriter
 
 
 class TileWriter:
@@ -89,9 +88,8 @@ class TileWriter:
             f"{self.region.y + row}): repair the basis images there, or capture again"
         )
 
-    def write(self, folder: Path) -> dict[str, int]:
-        """Write the arrays; returns how many entries each model took."""
-        folder.mkdir(parents=True)
+    def write(self, out: TileFileWriter) -> dict[str, int]:
+        """Write the arrays; returns how many entries each model took. Raises OSError."""
         used = {}
         blocks = blocks_of(self.region.pixels)
         inverse = np.divide(1, self.peaks, out=np.zeros_like(self.peaks), where=self.peaks > 0)
@@ -121,26 +119,26 @@ class TileWriter:
                         packed = np.packbits(bits[where])
                         parts[b, k] = codes[:, rows], parameters[:, rows], packed
             each = [parts[key] for key in sorted(parts)]
-            np.save(folder / f"{name}_counts.npy", counts)
+            out.add(f"{name}_counts", counts)
             for what, arrays in zip(
                 ("coefficient", "parameters", "pixels"), zip(*each, strict=True), strict=True
             ):
-                np.save(folder / f"{name}_{what}.npy", np.concatenate(arrays, axis=-1))
+                out.add(f"{name}_{what}", np.concatenate(arrays, axis=-1))
             used[name] = int(counts.sum())
         peaks = self.peaks * np.divide(meant, coded, out=np.zeros_like(coded), where=coded > 0)
         peaks *= np.float32(FULL**2)
         units = _unit(peaks), _unit(self.rest)
-        np.save(folder / "peaks.npy", _halves(peaks.T, units[0]))
-        np.save(folder / "scales.npy", np.array(units, np.float32))
+        out.add("peaks", _halves(peaks.T, units[0]))
+        out.add("scales", np.array(units, np.float32))
         if self.rest.any():
-            np.save(folder / "rest.npy", _halves(self.rest, units[1]))
-            np.save(folder / "rest_patches.npy", np.stack(self.rest_bits))
+            out.add("rest", _halves(self.rest, units[1]))
+            out.add("rest_patches", np.stack(self.rest_bits))
             # relative to the largest: only their ratios count, and none that is one may vanish
             weights = np.array(self.rest_of) / max(self.rest_of)
             weights = np.where(weights > 0, np.maximum(weights, 1e-30), 0)
-            np.save(folder / "rest_weights.npy", weights.astype(np.float32))
+            out.add("rest_weights", weights.astype(np.float32))
         for name, pixels in self.layers.items():
-            write_layer(folder, name, pixels)
+            out.add(name, stored_layer(name, pixels))
         return used
 
 
@@ -154,9 +152,7 @@ def _halves(values: NDArray, unit: float) -> NDArray[np.float16]:
     return np.minimum(values / unit, 65504).astype(np.float16)
 
 
-def write_layer(folder: Path, name: str, pixels: NDArray) -> None:
-    """Write one of `field.LAYERS` of a tile into its folder, whole or not at all."""
+def stored_layer(name: str, pixels: NDArray) -> NDArray:
+    """One of `field.LAYERS` as it is stored: exactly what is of one ray or light, else halves."""
     exact = name in OF_ONE_RAY or name.startswith("own")
-    dtype = np.float32 if exact else np.float16
-    with whole(folder / f"{name}.npy") as partial, partial.open("wb") as f:
-        np.save(f, pixels.astype(dtype))
+    return pixels.astype(np.float32 if exact else np.float16)

@@ -7,12 +7,17 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+from numpy.typing import NDArray
+
 from ..errors import FieldError
 from ..files import PART, replace_folder, write_text
 from ..hemicube import Hemicube
-from .field import HEADER, VERSION, proxy_folder
+from .field import HEADER, VERSION, Field, proxy_folder
 from .proxy import FACTORS, proxies
-from .tile_writer import TileWriter
+from .tile import SUFFIX
+from .tile_file import rewrite, written
+from .tile_folder import rewrite_folder
+from .tile_writer import TileWriter, stored_layer
 
 
 def describe(hemicube: Hemicube, shape: tuple[int, int], **about: Any) -> dict[str, Any]:
@@ -38,15 +43,13 @@ def write_tile(
     number: tiles are written from the top; of: the field that it will be, for messages. Raises
     FieldError.
     """
-    name = f"tile_{number:04d}"
+    name = f"tile_{number:04d}{SUFFIX}"
 
     def write(tile: TileWriter, folder: Path) -> dict[str, Any]:
         r = tile.region
-        partial = folder / (name + PART)
-        shutil.rmtree(partial, ignore_errors=True)
-        used = tile.write(partial)
-        replace_folder(partial, folder / name)
-        return {"folder": name, "region": [r.x, r.y, r.width, r.height], "entries": used}
+        with written(folder / name) as out:
+            used = tile.write(out)
+        return {"file": name, "region": [r.x, r.y, r.width, r.height], "entries": used}
 
     with _writing(of or folder):
         # the tile itself last: where it is, its proxies are
@@ -68,6 +71,30 @@ def write_head(folder: Path, head: dict[str, Any]) -> None:
                 own = head | size | {"about": about, "tiles": tiles}
                 write_text(proxy_folder(folder, factor) / HEADER, json.dumps(own, indent=1))
         write_text(folder / HEADER, json.dumps(head, indent=1))
+
+
+def replace_layers(field: Field, layers: dict[str, NDArray]) -> None:
+    """Put layers into a field on disk, new ones or in the place of those of their names.
+
+    The file of each tile is written anew, whole or not at all. The field is closed first.
+
+    Parameters
+    ----------
+    field
+        The field; not its proxies, which are fields of their own.
+    layers
+        By their names, of the whole picture, (H, W) or (H, W, 3).
+
+    Raises
+    ------
+    FieldError
+        If a tile is damaged, or cannot be written.
+    """
+    field.close()
+    with _writing(field.folder):
+        for tile in field.tiles:
+            cut = {n: stored_layer(n, pixels[tile.region.slices]) for n, pixels in layers.items()}
+            (rewrite if tile.path.suffix == SUFFIX else rewrite_folder)(tile.path, cut)
 
 
 class FieldWriter:

@@ -235,7 +235,7 @@ def test_bad_output_and_bad_world_lose_nothing(tmp_path):
     with pytest.raises(ArtoError, match="choose a folder"):
         relit(scene)
     assert (tmp_path / "relit.exr").read_bytes() == kept
-    damaged = paths.field_folder(scene) / "tile_0000" / "peaks.npy"
+    damaged = paths.field_folder(scene) / "tile_0000.arto"
     damaged.write_bytes(damaged.read_bytes()[:100])
     scene.arto.output = str(tmp_path / "relit.exr")
     with pytest.raises(FieldError, match="fit again"):

@@ -15,11 +15,7 @@ from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import CaptureSetError, PatternError, SceneError
 from arto.core.field.field import Field
 from scene_tools import small_scene
-from shot_tools import unfinished
-
-
-def arrays(folder):
-    return {p.relative_to(folder): np.load(p) for p in sorted(folder.rglob("*.npy"))}
+from shot_tools import arrays, unfinished
 
 
 def in_tiles(monkeypatch, rows=6):

@@ -13,12 +13,16 @@ import numpy as np
 import pytest
 from arto.core import exr
 from arto.core.capture import capture_set, names
+from arto.core.errors import FieldError
 from arto.core.field.field import Field
+from arto.core.field.tile_file import TileFile, written
 from arto.core.fit import fit
 from arto.core.hemicube import Hemicube
 from arto.core.light.environment import Environment
+from arto.core.light.light import PatchLight
 from arto.core.patterns import PatternSet, monomials, pattern_set
 from arto.core.region import Region
+from arto.core.relight import relight
 from hypothesis import settings
 from numpy.typing import NDArray
 
@@ -193,6 +197,36 @@ def _fitted(capture: Path, folder: Path, choice: str = "box") -> Field:
     return Field(folder)
 
 
+def _arrays_of(tile: Path) -> dict[str, NDArray]:
+    """All arrays of a tile's file."""
+    there = TileFile(tile)
+    return {name: there.load(name).copy() for name in there.sizes}
+
+
+def _put_arrays(tile: Path, **arrays: NDArray | None) -> None:
+    """Write a tile's file anew with other arrays, whole and with right checksums; None: without."""
+    kept = _arrays_of(tile) | arrays
+    with written(tile) as out:
+        for name, array in kept.items():
+            if array is not None:
+                out.add(name, array)
+
+
+def _used(folder: Path) -> NDArray[np.float32]:
+    """The picture of a field under even light."""
+    with Field(folder) as field:
+        return relight(field, PatchLight(Environment.uniform(1.0, 16), field.hemicube))
+
+
+def _refused(folder: Path, *says: str) -> None:
+    """Opening or using the field fails with a message that holds `says` and advice."""
+    with pytest.raises(FieldError) as e:
+        _used(folder)
+    for text in says:
+        assert text in str(e.value), (text, str(e.value))
+    assert "fit again" in str(e.value)
+
+
 # Helpers come as fixtures: test files are no package, so they cannot import this one.
 def _helper(function: Callable) -> Callable:
     return pytest.fixture(scope="session", name=function.__name__.lstrip("_"))(lambda: function)
@@ -214,6 +248,10 @@ noisy = _helper(_noisy)
 scene = _helper(_scene)
 write_scene = _helper(_write_scene)
 fitted = _helper(_fitted)
+arrays_of = _helper(_arrays_of)
+put_arrays = _helper(_put_arrays)
+used = _helper(_used)
+refused = _helper(_refused)
 
 
 @pytest.fixture

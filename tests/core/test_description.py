@@ -161,8 +161,8 @@ def test_files_lie_in_the_set_itself(folders, name) -> None:
     text = json.dumps(put(head, ("tiles", 0, "files", 0), name))
     assert "'files' cannot be" in opened(CaptureSet, folders[CaptureSet], text)
     head = head_of(Field, folders[Field])
-    text = json.dumps(put(head, ("tiles", 0, "folder"), name))
-    assert "'folder' cannot be" in opened(Field, folders[Field], text)
+    text = json.dumps(put(head, ("tiles", 0, "file"), name))
+    assert "'file' cannot be" in opened(Field, folders[Field], text)
 
 
 def test_tiles_that_overlap_are_refused(folders) -> None:

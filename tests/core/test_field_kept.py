@@ -11,6 +11,7 @@ import pytest
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import CaptureSetError, FieldError, PatternError
 from arto.core.field.field import Field
+from arto.core.field.tile_file import TileFileWriter
 from arto.core.fit import fit
 from arto.core.hemicube import Hemicube
 from arto.core.region import Region
@@ -70,8 +71,8 @@ def test_a_capture_that_breaks_on_the_way_keeps_the_old_field(
 
 def test_what_a_crash_left_behind_does_no_harm(tmp_path: Path, capture: Path, fitted) -> None:
     for name in ("field.part", "field.old"):
-        (tmp_path / name / "tile_0000").mkdir(parents=True)
-        (tmp_path / name / "tile_0000" / "codes.npy").write_text("half of it")
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "tile_0000.arto").write_text("half of it")
     fitted(capture, tmp_path / "field")
     assert {f.name for f in tmp_path.iterdir()} == {"capture", "field"}
 
@@ -123,14 +124,14 @@ def test_a_write_that_fails_keeps_the_old_field(
 ) -> None:
     fitted(capture, tmp_path / "field")
     before = contents(tmp_path / "field")
-    save: Callable = np.save
+    add: Callable = TileFileWriter.add
 
-    def failing(path, array: np.ndarray) -> None:
-        if Path(getattr(path, "name", path)).name.startswith(f"{name}.npy"):
+    def failing(out: TileFileWriter, array_name: str, array: np.ndarray) -> None:
+        if array_name == name:
             raise OSError(errno.ENOSPC, "No space left on device")
-        save(path, array)
+        add(out, array_name, array)
 
-    monkeypatch.setattr(np, "save", failing)
+    monkeypatch.setattr(TileFileWriter, "add", failing)
     with pytest.raises(FieldError, match=r"No space left on device.*make room"):
         fitted(capture, tmp_path / "field")
     assert contents(tmp_path / "field") == before

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from arto.core.field.field import Field
-from arto.core.field.tile_writer import write_layer
+from arto.core.field.writer import replace_layers
 from arto.core.hemicube import Hemicube
 from arto.core.light.light import PatchLight
 from arto.core.preview import Preview, own_light
@@ -67,10 +67,8 @@ def test_gains_of_the_scenes_lamps(field: Field) -> None:
     """Light groups add up to the scene's own light: each is dimmed by itself."""
     rng = np.random.default_rng(1)
     key, fill = (rng.uniform(0, 1, (*SHAPE, 3)).astype(np.float32) for _ in range(2))
-    tile = field.tiles[0]
     own = key + fill + 0.25
-    for name, layer in (("own", own), ("own_key", key), ("own_fill", fill)):
-        write_layer(tile.folder, name, layer)
+    replace_layers(field, {"own": own, "own_key": key, "own_fill": fill})
     field = Field(field.folder)
     # layers are stored as halves
     near = {"rtol": 2e-3, "atol": 2e-3}
