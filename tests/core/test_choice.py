@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import FieldError, PatternError
+from arto.core.field import tile_file
 from arto.core.field.tile import Tile
 from arto.core.field.tile_writer import TileWriter
 from arto.core.fit.choice import BROAD, CHOICES, check, choose
@@ -192,8 +193,10 @@ def test_what_is_dropped_of_a_tile_stays_under_its_share(
         data = CaptureSet(write_scene(tmp_path / f"{seed}", made)).read(0)
         *_, tile = fit_tile(data, made.patterns, made.hemicube, "auto")
         assert isinstance(tile, TileWriter)
-        folder = tmp_path / f"tile_{seed}"
-        written = Tile(folder, data.region, tile.write(folder), len(made.hemicube))
+        path = tmp_path / f"tile_{seed}.arto"
+        with tile_file.written(path) as out:
+            used = tile.write(out)
+        written = Tile(path, data.region, used, len(made.hemicube))
         kept = ~np.isin(written.codes, (NOTHING, REST))
         size = made.coefficient.sum(axis=-1).reshape(kept.shape)
         dropped = np.where(kept, 0, size).sum(axis=0)
