@@ -22,6 +22,8 @@ from ...core.patterns import pattern_set
 from ...core.region import Region
 from ...core.shot import Shot
 from ..blender.colour import working_space
+from ..settings.setting import Decides
+from ..settings.table import values
 from ..shot import home
 from ..shot.fingerprint import fingerprint, key_of
 from ..shot.shot import shot_of
@@ -94,11 +96,8 @@ def asked(
         shot = shot_of(scene, view_layer, region)
         decides = {
             "samples": samples_of(scene),
-            "seed": settings.seed,
-            "route": settings.route,
+            **values(settings, Decides.CAPTURE),
             "grain": grain,
-            "adaptive": settings.adaptive,
-            "far": settings.far,
             "blender": bpy.app.version_string,
             "colour_space": working_space(),
             "film_transparent": scene.render.film_transparent,
@@ -112,13 +111,13 @@ def asked(
             describe(hemicube, patterns, (shot.height, shot.width), **decides),
             vars(region),
             frame,
-            settings.memory,
+            *values(settings, Decides.CAPTURE_TILES).values(),
             key_of(found),
             VERSION,
-            settings.keep,
+            *values(settings, Decides.CAPTURE_KEPT).values(),
         ]
         if settings.keep != "always":
-            everything += [settings.keep_limit, settings.support, settings.separate]
+            everything += values(settings, Decides.CAPTURE_FIT).values()
         key = hashlib.sha256(json.dumps(everything, sort_keys=True).encode()).hexdigest()[:16]
         catchers = bool(seen.catchers)
         yield Asked(

@@ -7,7 +7,6 @@ there whole or not at all.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -26,6 +25,7 @@ from ..capture import room
 from ..capture.capture import plan_of
 from ..capture.room import Estimate
 from ..capture.sequence import frame_kept
+from ..settings.table import FARM
 from ..shot import home
 from ..stage.settings import samples_told
 from ..stage.takes import TAKES, WHOLE
@@ -36,13 +36,6 @@ READABLE = (1, VERSION)
 HEADER = "job.json"
 PART_HEADER = "part.json"
 MOST = 1_000_000
-# What of ARTO's settings a capture reads, its fit and the denoising of its guides; not where files
-# are on a machine. A preset sets faces, and samples the quality: they come before what they set.
-SETTINGS = (
-    "preset", "faces", "half_sides", "patches", "adaptive", "align", "rotation", "far", "size",
-    "samples", "quality", "patterns", "grain", "route", "seed", "memory", "keep", "keep_limit",
-    "support", "separate", "denoise",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -191,7 +184,7 @@ def _set(scene: bpy.types.Scene, settings: dict[str, Any]) -> None:
     for name in settings:
         if name not in scene.arto.bl_rna.properties:
             raise FarmError(f"this ARTO has no setting '{name}': use the one that planned")
-    for name in SETTINGS:
+    for name in FARM:
         if name in settings:
             value = settings[name]
             setattr(scene.arto, name, set(value) if isinstance(value, list) else value)
@@ -205,9 +198,9 @@ def estimate(head: dict[str, Any], fitted: bool) -> Estimate:
 
 
 def settings_of(scene: bpy.types.Scene) -> dict[str, Any]:
-    """ARTO's settings of a scene that `SETTINGS` names."""
+    """ARTO's settings of a scene that go to a farm."""
     found = {}
-    for name in SETTINGS:
+    for name in FARM:
         value = getattr(scene.arto, name)
         found[name] = sorted(value) if isinstance(value, set) else value
     if samples_told(scene):
@@ -232,7 +225,6 @@ def write(
         "format": "ARTO farm job",
         "version": VERSION,
         "blend": blend.name,
-        "sha256": hashlib.sha256(blend.read_bytes()).hexdigest(),
         "blender": bpy.app.version_string,
         "scene": scene.name,
         "view_layer": view_layer,

@@ -6,13 +6,13 @@ import hashlib
 
 import bpy
 
+from ..settings.setting import Decides
+from ..settings.table import values
 from ..world.kept import shows
 from ..world.own import gains_of
 
 # In a plate's header.
 HEADER = "arto.light key"
-# Settings that change the picture.
-_SETTINGS = ("own_lamps", "lamps", "lamp_samples", "denoise", "environment_width", "layers")
 
 
 def light_key(scene: bpy.types.Scene, world: bpy.types.World) -> str:
@@ -20,6 +20,6 @@ def light_key(scene: bpy.types.Scene, world: bpy.types.World) -> str:
     key, strength, turn = shows(scene, world)
     settings = scene.arto
     of: list[object] = [key, round(strength, 5), round(turn, 5), scene.render.film_transparent]
-    of += [str(getattr(settings, n)) for n in _SETTINGS]
+    of += [str(value) for value in values(settings, Decides.PLATE).values()]
     of += [sorted((n, round(g, 5)) for n, g in gains_of(settings).items())]
     return hashlib.sha256(repr(of).encode()).hexdigest()[:16]

@@ -22,9 +22,10 @@ from ..job import run as job
 from ..live import maps
 from ..relight.many import relight_frames, relight_many
 from ..relight.relight import relight
+from ..settings import table
+from ..settings.setting import Setting
 from ..shot import paths
 from ..work import Progress, ProgressLines, Render, run
-from . import properties
 
 _commands: list[Any] = []
 
@@ -41,14 +42,14 @@ def _parser() -> argparse.ArgumentParser:
     files.add_argument("--view-layer", help="name of the view layer (default: the scene's)")
     files.add_argument("--folder", help="where capture set and field are kept (default: //arto/)")
     for name, text, settings in (
-        ("capture", "render the basis images", (*properties.HEMICUBE, *properties.CAPTURE)),
-        ("fit", "fit the reflectance field", properties.FIT),
-        ("relight", "relight with the scene's world", properties.RELIGHT),
+        ("capture", "render the basis images", table.options("hemicube", "capture")),
+        ("fit", "fit the reflectance field", table.options("fit")),
+        ("relight", "relight with the scene's world", table.options("relight")),
         ("adopt", "use what was captured for another file or scene", ()),
         (
             "plan",
             "plan a capture by many machines",
-            (*properties.HEMICUBE, *properties.CAPTURE, *properties.FIT),
+            table.options("hemicube", "capture", "fit"),
         ),
     ):
         one = jobs.add_parser(name, parents=[files], help=text)
@@ -110,19 +111,18 @@ def _frames(text: str) -> range:
     return found
 
 
-def _add_option(parser: argparse.ArgumentParser, name: str) -> None:
+def _add_option(parser: argparse.ArgumentParser, setting: Setting) -> None:
     """An option for a setting, as the setting describes itself."""
-    prop = properties.ArtoSettings.bl_rna.properties[name]
-    option: dict[str, Any] = {"default": None, "help": prop.description.replace("%", "%%")}
-    if prop.type == "ENUM":
-        option["choices"] = [item.identifier for item in prop.enum_items]
-        if prop.is_enum_flag:
+    option: dict[str, Any] = {"default": None, "help": setting.words.replace("%", "%%")}
+    if setting.kind in ("choice", "choices"):
+        option["choices"] = [identifier for identifier, _, _ in setting.items]
+        if setting.kind == "choices":
             option["nargs"] = "+"
-    elif prop.type == "BOOLEAN":
+    elif setting.kind == "switch":
         option["action"] = argparse.BooleanOptionalAction
     else:
-        option["type"] = {"INT": int, "FLOAT": float, "STRING": str}[prop.type]
-    parser.add_argument(f"--{name.replace('_', '-')}", **option)
+        option["type"] = {"whole": int, "number": float, "text": str}[setting.kind]
+    parser.add_argument(f"--{setting.name.replace('_', '-')}", **option)
 
 
 def main(arguments: list[str]) -> int:

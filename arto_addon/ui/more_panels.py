@@ -8,9 +8,9 @@ from ...core.errors import ArtoError
 from ...core.hemicube import SIDES
 from ...core.units import size
 from ..capture import planes
+from ..settings.table import in_panel
 from ..shot import paths, status
 from ..shot.shot import layer_of
-from . import properties
 from .places import Draws, say
 from .preferences import research
 
@@ -142,17 +142,17 @@ class Method(Draws):
             "half_sides": any(face in settings.faces for face in SIDES),
             "size": not settings.far,
         }
-        for name in properties.HEMICUBE:
+        for name in in_panel("Method", "hemicube"):
             sub = column.column()
             sub.active = apply.get(name, True)
             if name != "faces" or sub.active:
                 sub.prop(settings, name)
-        for name in ("patterns", "grain", "route", "seed"):
+        for name in in_panel("Method", "capture"):
             column.prop(settings, name)
         column.separator()
         column.operator("arto.capture", icon="RENDER_STILL")
         _line(column, context, status.capture_line(scene))
-        for name in properties.FIT:
+        for name in in_panel("Method", "fit"):
             column.prop(settings, name)
         column.operator("arto.fit", icon="MOD_LATTICE")
         _line(column, context, status.field_line(scene))

@@ -1,41 +1,114 @@
-"""The settings on `scene.arto`."""
+"""The settings on `scene.arto`, as Blender's properties, made of `settings.table`."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
-from bpy.props import PointerProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
 
-from .capture_settings import CaptureSettings
-from .relight_settings import ArtoGroup, ArtoLamps, ArtoLook, RelightSettings
+from ...core.hemicube import FACE_NAMES, PRESETS
+from ..plate import compare
+from ..plate.present import use
+from ..relight import looks
+from ..settings.setting import Setting
+from ..settings.table import SETTINGS
+from .lists import ENTRIES
 
 
-class ArtoSettings(CaptureSettings, RelightSettings, bpy.types.PropertyGroup):
+class ArtoSettings(bpy.types.PropertyGroup):
     """What the artist may choose; capture, fit and relight read it."""
 
-    scene_id: StringProperty(
-        name="Scene ID",
-        description="By which what was captured of this scene is found when it or its file is "
-        "renamed",
-        options={"HIDDEN"},
-        default="",
-    )
+
+def _preset_chosen(self: ArtoSettings, context: bpy.types.Context) -> None:
+    if self.preset in PRESETS:
+        self["faces"] = sum(1 << FACE_NAMES.index(f) for f in PRESETS[self.preset])
+        self["half_sides"] = self.preset == "paper"
+        if self.preset == "paper":
+            # half a side cannot be split in four
+            self["adaptive"] = False
 
 
-# Which settings each piece of work reads: panel and command line take them from here.
-HEMICUBE = (
-    "preset", "faces", "half_sides", "patches", "adaptive", "align", "rotation", "far", "size",
-)  # fmt: skip
-CAPTURE = (
-    "samples", "quality", "patterns", "grain", "route", "seed", "memory", "keep", "keep_limit",
-)  # fmt: skip
-FIT = ("support", "separate")
-RELIGHT = (
-    "own_lamps", "lamps", "lamp_samples", "denoise", "environment_width", "look", "output",
-    "layers", "layer_prefix", "layers_files", "layers_half", "write_data", "cryptomatte", "shadows",
-    "data_window", "overscan",
-)  # fmt: skip
+def _samples_chosen(self: ArtoSettings, context: bpy.types.Context) -> None:
+    # who says how many samples wants these: scripts say nothing else
+    self.quality = "CUSTOM"
 
-CLASSES = (ArtoGroup, ArtoLook, ArtoLamps, ArtoSettings)
+
+def _use_chosen(self: ArtoSettings, context: bpy.types.Context) -> None:
+    use(self.id_data)
+
+
+def _look_chosen(self: ArtoSettings, context: bpy.types.Context) -> None:
+    looks.show(self.id_data)
+
+
+def _compare_chosen(self: ArtoSettings, context: bpy.types.Context) -> None:
+    compare.update(self.id_data)
+
+
+# What follows when a setting is set.
+_FOLLOWS = {
+    "preset": _preset_chosen,
+    "samples": _samples_chosen,
+    "use_in_compositor": _use_chosen,
+    "compare": _compare_chosen,
+    "wipe": _compare_chosen,
+    "active_look": _look_chosen,
+}
+_PROPERTIES = {
+    "switch": BoolProperty,
+    "whole": IntProperty,
+    "number": FloatProperty,
+    "text": StringProperty,
+    "choice": EnumProperty,
+    "choices": EnumProperty,
+    "image": PointerProperty,
+    "list": CollectionProperty,
+}
+
+
+def _property(setting: Setting) -> Any:
+    """Blender's property of a setting, not yet registered."""
+    facts: dict[str, Any] = {
+        "name": setting.title,
+        "description": setting.words,
+        "default": setting.default,
+        "min": setting.least,
+        "max": setting.most,
+        "soft_min": setting.soft_least,
+        "soft_max": setting.soft_most,
+        "subtype": setting.subtype,
+        "update": _FOLLOWS.get(setting.name),
+    }
+    if setting.kind == "choice":
+        facts["items"] = list(setting.items)
+    elif setting.kind == "choices":
+        facts["items"] = [(*item, 1 << i) for i, item in enumerate(setting.items)]
+        facts["options"] = {"ENUM_FLAG"}
+        facts["default"] = set(setting.default)
+    elif setting.kind == "image":
+        facts["type"] = bpy.types.Image
+    elif setting.kind == "list":
+        facts["type"] = ENTRIES[setting.name]
+    if setting.subtype.endswith("_PATH"):
+        facts["options"] = {"PATH_SUPPORTS_BLEND_RELATIVE"}
+    if setting.hidden:
+        facts["options"] = {"HIDDEN"}
+    said = {name: fact for name, fact in facts.items() if fact is not None and fact != ""}
+    return _PROPERTIES[setting.kind](**said)
+
+
+ArtoSettings.__annotations__ = {setting.name: _property(setting) for setting in SETTINGS}
+
+CLASSES = (*ENTRIES.values(), ArtoSettings)
 
 
 def register() -> None:

@@ -15,8 +15,8 @@ from arto.arto_addon.farm import job as jobs
 from arto.arto_addon.farm import part as parts
 from arto.arto_addon.farm.gather import gather
 from arto.arto_addon.relight.relight import relight
+from arto.arto_addon.settings.table import FARM
 from arto.arto_addon.shot import paths
-from arto.arto_addon.ui import properties
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import FarmError, SceneError
 from arto.core.field.field import Field
@@ -56,7 +56,7 @@ def test_the_quality_is_that_of_the_scene(farm_scene, tmp_path, seeds):
     rendered and where a gathering is gone on with."""
     farm_scene.arto.adaptive = farm_scene.arto.far = False
     farm_scene.arto.quality, farm_scene.cycles.samples = "DRAFT", 24
-    before = {name: getattr(farm_scene.arto, name) for name in jobs.SETTINGS}
+    before = {name: getattr(farm_scene.arto, name) for name in FARM}
     job = planned_job(farm_scene, tmp_path / "job", seeds=seeds)
     for p in job.parts:
         folder = work.run(parts.render_part(job.folder, p.number))
@@ -73,7 +73,7 @@ def test_the_quality_is_that_of_the_scene(farm_scene, tmp_path, seeds):
     (found,) = work.run(gather(job.folder))
     head = CaptureSet(paths.capture_folder(farm_scene)).head
     assert Field(found).about["samples"] == head["samples"] == 6 * seeds
-    assert {name: getattr(farm_scene.arto, name) for name in jobs.SETTINGS} == before
+    assert {name: getattr(farm_scene.arto, name) for name in FARM} == before
 
 
 def test_a_scene_that_has_no_id_yet_is_found_when_it_is_renamed(farm_scene, tmp_path):
@@ -100,11 +100,6 @@ def test_a_preset_does_not_undo_what_was_chosen_after_it(farm_scene, tmp_path):
         assert scene.arto.faces == {"top", "left"} and scene.arto.half_sides
         assert scene.arto.patches == 2
     assert len(farm_scene.arto.faces) == 6 and farm_scene.arto.patches == 3
-
-
-def test_a_job_has_all_that_a_capture_reads():
-    asked = {*properties.HEMICUBE, *properties.CAPTURE, *properties.FIT, "denoise"}
-    assert len(jobs.SETTINGS) == len(asked) and set(jobs.SETTINGS) == asked
 
 
 def test_a_job_of_the_version_before_goes_on(farm_scene, tmp_path):

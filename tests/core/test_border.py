@@ -64,6 +64,12 @@ def test_every_module_is_small_and_documented(module: Path) -> None:
     assert ast.get_docstring(ast.parse(text))
 
 
+def test_settings_need_no_blender() -> None:
+    files = [p for p in HOUSE if p.parent.name == "settings"]
+    assert "table" in {p.stem for p in files}
+    assert not set().union(*map(imported, files)) & BLENDER
+
+
 TESTS = sorted((CORE.parent / "tests").rglob("test_*.py"))
 
 
@@ -87,8 +93,8 @@ FLOW = {
     "core": """errors < units < files < region < description < shot < metrics < patterns < measure
     < hemicube < exr < cryptomatte < capture < light < supports < field < fit < lights < relight
     < catcher < preview < inside < verify""",
-    "arto_addon": """work < blender < stage < shot < world < plate < fit < capture < relight < shoot
-    < job < live < farm < ui""",
+    "arto_addon": """work < settings < blender < stage < shot < world < plate < fit < capture
+    < relight < shoot < job < live < farm < ui""",
 }
 
 

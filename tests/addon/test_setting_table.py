@@ -1,0 +1,154 @@
+"""What the table of settings says is so: in the keys, on a farm, in the panels."""
+
+from __future__ import annotations
+
+import dataclasses
+from types import SimpleNamespace
+from typing import Any
+
+import bpy
+import pytest
+from arto.arto_addon.capture.asked import asked
+from arto.arto_addon.farm.job import settings_of
+from arto.arto_addon.relight.light_key import light_key
+from arto.arto_addon.settings.setting import Setting
+from arto.arto_addon.settings.table import SETTINGS
+from arto.arto_addon.ui import light_panel, more_panels, result_panel, shot_panel
+from scene_tools import hdri, small_scene, smooth
+
+VALUES = [s for s in SETTINGS if s.kind not in ("image", "list")]
+
+
+@pytest.fixture
+def scene(tmp_path) -> bpy.types.Scene:
+    """A scene in which every setting counts: the hemicube is near, and its images are not kept."""
+    made = small_scene(tmp_path)
+    hdri(made, smooth(16))
+    made.camera.rotation_euler.z = 0.5
+    settings = made.arto
+    settings.keep, settings.far, settings.samples, settings.rotation = "never", False, 77, 0.1
+    return made
+
+
+def other(setting: Setting, value: Any) -> Any:
+    """A value that the setting does not have."""
+    if setting.kind == "switch":
+        return not value
+    if setting.kind == "choice":
+        return next(identifier for identifier, _, _ in setting.items if identifier != value)
+    if setting.kind == "choices":
+        return set(value) - {setting.items[0][0]}
+    if setting.kind == "text":
+        return f"{value}other"
+    return value / 2 + 1 if setting.kind == "number" else value + 3
+
+
+def keys(scene: bpy.types.Scene) -> tuple[str, str]:
+    """Of a capture, and of the light of a plate."""
+    with asked(scene, scene.view_layers[0].name) as this:
+        return this.key, light_key(scene, scene.world)
+
+
+def test_a_setting_says_all_that_hangs_on_it():
+    """Nobody adds one without asking whether it decides, and where it goes."""
+    facts = {f.name: f for f in dataclasses.fields(Setting)}
+    for name in ("work", "decides", "farm", "option", "panels"):
+        assert facts[name].default is dataclasses.MISSING
+        assert facts[name].default_factory is dataclasses.MISSING
+
+
+def test_a_scene_has_the_settings_of_the_table(scene):
+    there = {p.identifier for p in scene.arto.bl_rna.properties} - {"rna_type", "name"}
+    assert there == {s.name for s in SETTINGS}
+
+
+@pytest.mark.parametrize("setting", VALUES, ids=lambda s: s.name)
+def test_a_setting_decides_what_it_says(scene, setting):
+    capture, plate = keys(scene)
+    setattr(scene.arto, setting.name, other(setting, getattr(scene.arto, setting.name)))
+    after = keys(scene)
+    assert (after[0] != capture) == setting.decides.of_capture
+    assert (after[1] != plate) == setting.decides.of_plate
+
+
+@pytest.mark.parametrize("name", ["keep_limit", "support", "separate"])
+def test_a_fit_decides_no_capture_whose_images_are_kept(scene, name):
+    scene.arto.keep = "always"
+    before = keys(scene)
+    (setting,) = (s for s in SETTINGS if s.name == name)
+    setattr(scene.arto, name, other(setting, getattr(scene.arto, name)))
+    assert keys(scene) == before
+
+
+def test_lists_decide_what_they_say(scene):
+    before = keys(scene)
+    for setting in (s for s in SETTINGS if s.kind == "list"):
+        entry = getattr(scene.arto, setting.name).add()
+        entry.name = "new"
+        capture, plate = keys(scene)
+        assert (capture != before[0], plate != before[1]) == (
+            setting.decides.of_capture,
+            setting.decides.of_plate,
+        )
+        getattr(scene.arto, setting.name).clear()
+
+
+def test_what_decides_a_capture_goes_to_a_farm(scene):
+    """Its machines would capture something else; where files are is each machine's own."""
+    goes = set(settings_of(scene))
+    assert goes == {s.name for s in SETTINGS if s.farm}
+    assert goes == {s.name for s in SETTINGS if s.decides.of_capture} | {"denoise"}
+    assert all(s.option for s in SETTINGS if s.farm)
+
+
+class Layout:
+    """A panel's layout that writes down the settings that stand in it."""
+
+    def __init__(self, settings: Any, found: set[str]) -> None:
+        self._settings, self._found = settings, found
+
+    def prop(self, of: Any, name: str, **_: Any) -> None:
+        if of == self._settings:
+            self._found.add(name)
+
+    def template_list(self, _kind: str, _id: str, of: Any, name: str, at: Any, active: str, **_):
+        self._found |= {name, active} if of == at == self._settings else set()
+
+    def row(self, **_: Any) -> Layout:
+        return Layout(self._settings, self._found)
+
+    column = row
+
+    def __getattr__(self, name: str) -> Any:
+        # what a panel has besides settings: labels, buttons, pictures
+        return lambda *_, **__: SimpleNamespace()
+
+
+def test_a_setting_stands_in_the_panels_that_it_says(scene, monkeypatch):
+    monkeypatch.setattr(result_panel, "plate_line", lambda scene: ("12:00", True))
+    settings = scene.arto
+    settings.preset, settings.keep, settings.layers = "custom", "fits", "GROUPS"
+    settings.write_data, settings.lamps, settings.compare = True, True, "WIPE"
+    settings.looks.add().name = "Evening"
+    settings.own_groups.add().name = "Lamp"
+    context = SimpleNamespace(
+        scene=scene,
+        window_manager=bpy.context.window_manager,
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
+        region=None,
+    )
+    panels = {
+        "Shot": shot_panel.Shot,
+        "Light": light_panel.Light,
+        "Result": result_panel.Result,
+        "Quality": shot_panel.Quality,
+        "Layers": more_panels.Layers,
+        "Storage": more_panels.Storage,
+        "Method": more_panels.Method,
+    }
+    for title, panel in panels.items():
+        found: set[str] = set()
+        panel.draw_column(Layout(settings, found), context)
+        said = {s.name for s in SETTINGS if title in s.panels}
+        # an own group stands by itself, a row each
+        assert found == said - {"own_groups"}, title
