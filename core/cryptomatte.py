@@ -1,5 +1,21 @@
-"""Cryptomattes of a render, handed on as they are: mattes by name, in whole numbers that no filter
-may touch. What they are of stands in the header (Friedman and Jones 2015)."""
+"""Cryptomattes of a render, handed on unchanged.
+
+Their planes hold hashes of names and coverages; no filter may touch them. The header says which
+names they stand for.
+
+Examples
+--------
+>>> import tempfile
+>>> import numpy as np
+>>> folder = tempfile.TemporaryDirectory()
+>>> path = Path(folder.name) / "render.exr"
+>>> about = {"cryptomatte/a1b2c3d/name": "CryptoObject"}
+>>> exr.write_planes(path, {"CryptoObject00": {"R": np.zeros((2, 3))}}, about)
+>>> planes, found = read(path)
+>>> list(planes), found == about
+(['CryptoObject00.R'], True)
+>>> folder.cleanup()
+"""
 
 from __future__ import annotations
 
@@ -15,8 +31,29 @@ _KEY = "cryptomatte/"
 
 
 def read(path: Path) -> tuple[dict[str, NDArray], dict[str, Any]]:
-    """The Cryptomattes in an EXR file -> its planes (H, W) by the full names of their channels, of
-    all ranks, and the attributes that say what they are. Raises ExrError where there are none."""
+    """Read the Cryptomattes of an EXR file.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    planes : dict of str to (H, W) float32
+        The planes of all ranks by the full names of their channels.
+    about : dict
+        The attributes of the header that describe them.
+
+    Raises
+    ------
+    ExrError
+        The file has no Cryptomatte, or cannot be read.
+
+    Source
+    ------
+    Friedman and Jones, "Fully automatic ID mattes with support for motion blur and
+    transparency", 2015.
+    """
     parts = exr.whole_parts(path)
     about = {k: v for head, _ in parts for k, v in head.items() if str(k).startswith(_KEY)}
     names = [str(v) for k, v in about.items() if k.endswith("/name")]

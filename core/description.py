@@ -1,7 +1,24 @@
 """Descriptions: small JSON files that say what a folder holds, read without trusting them.
 
-Every value is asked for by the kind and the bounds that it must have, and what is not so is a typed
-error that names it. A panel reads descriptions while it is drawn: nothing else may come of one.
+Every value is asked for by its kind and its bounds. A value that is of another kind or out of
+bounds is a typed error that names it. A panel reads descriptions while it is drawn, so a damaged
+file must lead to no other exception.
+
+Examples
+--------
+>>> import tempfile
+>>> from arto.core.errors import FieldError
+>>> folder = tempfile.TemporaryDirectory()
+>>> path = Path(folder.name) / "field.json"
+>>> _ = path.write_text('{"height": 540, "width": 960, "samples": "many"}')
+>>> said = Description(path, FieldError)
+>>> said.shape()
+(540, 960)
+>>> said.number("samples", 0.0)
+Traceback (most recent call last):
+...
+arto.core.errors.FieldError: ... is damaged ('samples' cannot be 'many')
+>>> folder.cleanup()
 """
 
 from __future__ import annotations
@@ -16,7 +33,7 @@ from typing import Any, TypeVar
 from .errors import ArtoError
 from .region import Region
 
-# No description is larger: 100,000 things' fingerprints come to 8 MB.
+# The largest file that is read. Fingerprints of 100,000 objects take 8 MB.
 MOST_BYTES = 64 << 20
 LARGEST_SIDE = 65536
 MOST_TILES = 100_000
@@ -25,9 +42,19 @@ _NAME = re.compile(r"[\w][\w .~-]{0,120}")
 
 
 class Description:
-    """A JSON object from a file. `error` makes the exception of a text.
+    """A JSON object of a file.
 
-    Raises what `error` makes, for a file that cannot be read or is no object.
+    Parameters
+    ----------
+    path : Path
+        The file.
+    error : callable
+        Makes the exception for a text, such as `FieldError`.
+
+    Raises
+    ------
+    ArtoError
+        What `error` makes: the file cannot be read, is too large, or holds no JSON object.
     """
 
     def __init__(self, path: Path, error: Callable[[str], ArtoError]) -> None:
@@ -43,7 +70,19 @@ class Description:
         self.data: dict[str, Any] = data
 
     def wrong(self, name: str, value: Any) -> ArtoError:
-        """The error of a value that cannot be."""
+        """Make the error for a value that cannot be right.
+
+        Parameters
+        ----------
+        name : str
+            The name of the value.
+        value : object
+            What stands there.
+
+        Returns
+        -------
+        ArtoError
+        """
         return self.error(f"{self.path} is damaged ('{name}' cannot be {value!r:.60})")
 
     def _of(self, where: dict[str, Any], name: str) -> Any:
@@ -52,7 +91,25 @@ class Description:
         return where[name]
 
     def whole(self, name: str, low: int, high: int, where: dict[str, Any] | None = None) -> int:
-        """An integer within bounds, both included."""
+        """Read an integer within bounds.
+
+        Parameters
+        ----------
+        name : str
+        low, high : int
+            The bounds, both included.
+        where : dict, optional
+            The object that holds the value, if it is not the outermost one.
+
+        Returns
+        -------
+        int
+
+        Raises
+        ------
+        ArtoError
+            The value is missing, no integer, or out of bounds.
+        """
         value = self._of(self.data if where is None else where, name)
         if type(value) is not int or not low <= value <= high:
             raise self.wrong(name, value)
@@ -61,21 +118,72 @@ class Description:
     def number(
         self, name: str, default: float, low: float = -math.inf, high: float = math.inf
     ) -> float:
-        """A finite number within bounds, both included, or a default where there is none."""
+        """Read a finite number.
+
+        Parameters
+        ----------
+        name : str
+        default : float
+            The number where the description has none.
+        low, high : float
+            The bounds, both included.
+
+        Returns
+        -------
+        float
+
+        Raises
+        ------
+        ArtoError
+            The value is no finite number, or out of bounds.
+        """
         value = self.data.get(name, default)
         if type(value) not in (int, float) or not math.isfinite(value) or not low <= value <= high:
             raise self.wrong(name, value)
         return float(value)
 
     def text(self, name: str, where: dict[str, Any] | None = None) -> str:
-        """A text, of the whole description or of an object in it."""
+        """Read a text.
+
+        Parameters
+        ----------
+        name : str
+        where : dict, optional
+            The object that holds the value, if it is not the outermost one.
+
+        Returns
+        -------
+        str
+
+        Raises
+        ------
+        ArtoError
+            The value is missing, or no text.
+        """
         value = self._of(self.data if where is None else where, name)
         if not isinstance(value, str):
             raise self.wrong(name, value)
         return value
 
     def choice(self, name: str, among: Iterable[_Choice]) -> _Choice:
-        """One of some texts."""
+        """Read one of some texts.
+
+        Parameters
+        ----------
+        name : str
+        among : iterable of str
+            The texts that are allowed.
+
+        Returns
+        -------
+        str
+            The member of `among`.
+
+        Raises
+        ------
+        ArtoError
+            The value is missing, or none of the texts.
+        """
         value = self._of(self.data, name)
         for choice in among:
             if value == choice:
@@ -83,13 +191,44 @@ class Description:
         raise self.wrong(name, value)
 
     def only(self, *names: str, where: dict[str, Any] | None = None) -> None:
-        """Raise where the description, or an object in it, has a value of another name."""
+        """Check that an object has no values of other names.
+
+        Parameters
+        ----------
+        names : str
+            The names that are allowed.
+        where : dict, optional
+            The object, if it is not the outermost one.
+
+        Raises
+        ------
+        ArtoError
+            There is a value of another name. The message names it.
+        """
         for name in self.data if where is None else where:
             if name not in names:
                 raise self.error(f"{self.path} has an unknown '{name}'")
 
     def kind(self, name: str, kind: type, default: Any = None) -> Any:
-        """A value of a type; a default where it is not there or null."""
+        """Read a value of a type.
+
+        Parameters
+        ----------
+        name : str
+        kind : type
+            A truth value counts as `bool` only, and not as an integer.
+        default : object, optional
+            The value where the description has none, or null.
+
+        Returns
+        -------
+        object
+
+        Raises
+        ------
+        ArtoError
+            The value has another type.
+        """
         value = self.data.get(name)
         if value is None:
             return default
@@ -98,7 +237,22 @@ class Description:
         return value
 
     def texts(self, name: str) -> dict[str, str]:
-        """An object of texts, empty where there is none."""
+        """Read an object whose values are texts.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        dict of str to str
+            Empty where the description has none.
+
+        Raises
+        ------
+        ArtoError
+            The value is no object, or holds something else than texts.
+        """
         found = self.kind(name, dict, {})
         for key, value in found.items():
             if not isinstance(value, str):
@@ -106,17 +260,56 @@ class Description:
         return found
 
     def shape(self) -> tuple[int, int]:
-        """(height, width) of the picture."""
+        """Read the size of the picture.
+
+        Returns
+        -------
+        tuple of int
+            (height, width) in pixels.
+
+        Raises
+        ------
+        ArtoError
+            A side is missing or out of bounds.
+        """
         return self.whole("height", 1, LARGEST_SIDE), self.whole("width", 1, LARGEST_SIDE)
 
     def file_name(self, value: Any, name: str) -> str:
-        """The name of a file or folder in the description's own folder, and of none elsewhere."""
+        """Check a name of a file or folder that stands in the description's own folder.
+
+        Parameters
+        ----------
+        value : object
+            What the description holds.
+        name : str
+            The name of the value, for the error.
+
+        Returns
+        -------
+        str
+
+        Raises
+        ------
+        ArtoError
+            The value is no name, or would lead out of the folder.
+        """
         if not isinstance(value, str) or not _NAME.fullmatch(value) or value.endswith((" ", ".")):
             raise self.wrong(name, value)
         return value
 
     def tiles(self) -> list[tuple[Region, dict[str, Any]]]:
-        """The tiles: each one's region, inside the picture, and the rest of its entry."""
+        """Read the tiles of the picture.
+
+        Returns
+        -------
+        list of (Region, dict)
+            The region of each tile, inside the picture, and its whole entry.
+
+        Raises
+        ------
+        ArtoError
+            The list or one of the regions is damaged.
+        """
         height, width = self.shape()
         entries = self._of(self.data, "tiles")
         if not isinstance(entries, list) or len(entries) > MOST_TILES:
@@ -139,9 +332,19 @@ class Description:
         return found
 
     def check_apart(self, regions: list[Region]) -> None:
-        """Raise where two tiles have a pixel in common."""
+        """Check that no two tiles have a pixel in common.
+
+        Parameters
+        ----------
+        regions : list of Region
+
+        Raises
+        ------
+        ArtoError
+            Two regions overlap.
+        """
         rows = [(r.y, r.x, r.y + r.height, r.x + r.width) for r in regions]
-        # sorted by their tops, only tiles that begin above another's end can meet it
+        # by their tops: a tile can only meet those that have not ended above it
         rows.sort()
         open_rows: list[tuple[int, int, int, int]] = []
         for row in rows:

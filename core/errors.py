@@ -1,24 +1,37 @@
-"""The errors that ARTO raises: each message says what is wrong and what to do about it."""
+"""The errors that ARTO raises. Each message says what is wrong and what to do about it.
+
+Examples
+--------
+>>> from arto.core.patterns import pattern_set
+>>> try:
+...     pattern_set("whtie")
+... except ArtoError as error:
+...     print(error)
+no pattern set 'whtie': choose one of moments, moments_uv, linear, paper, white
+"""
 
 
 class ArtoError(Exception):
-    """Base of all of them; operators turn it into a report, the command line into an exit code."""
+    """The base of all errors of ARTO.
+
+    Operators turn it into a report, the command line into an exit code.
+    """
 
 
 class HemicubeError(ArtoError):
-    """A hemicube that cannot be: no faces, no patches, no size."""
+    """A hemicube that cannot exist: it has no faces, no patches or no size."""
 
 
 class PatternError(ArtoError):
-    """An unknown set of patterns, or one that cannot identify what was asked of it."""
+    """An unknown set of patterns, or a set that cannot identify the moments that were asked for."""
 
 
 class ExrError(ArtoError):
-    """An EXR file that is missing, truncated, or not what it should be."""
+    """An EXR file that is missing or truncated, or that holds something else than expected."""
 
 
 class CaptureSetError(ArtoError):
-    """A capture set that is incomplete, damaged, or belongs to something else."""
+    """A capture set that is incomplete or damaged, or that belongs to something else."""
 
 
 class FieldError(ArtoError):
@@ -26,7 +39,7 @@ class FieldError(ArtoError):
 
 
 class EnvironmentMapError(ArtoError):
-    """An environment map that cannot light anything."""
+    """An image that cannot be used as an environment map."""
 
 
 class SceneError(ArtoError):
@@ -34,7 +47,7 @@ class SceneError(ArtoError):
 
 
 class ShotError(ArtoError):
-    """A description of a shot that is none, or a shot that is another's."""
+    """A text that is no description of a shot, or the description of another shot."""
 
 
 class BusyError(ArtoError):
@@ -46,4 +59,4 @@ class CancelledError(ArtoError):
 
 
 class FarmError(ArtoError):
-    """A farm's job that is incomplete, damaged, or of another scene."""
+    """A farm's job that is incomplete or damaged, or that was made for another scene."""

@@ -1,7 +1,16 @@
-"""Files and folders that are there whole or not at all, and held by one process at a time.
+"""Writing files and folders whole or not at all, and holding a folder for one process.
 
-Every write of the project goes through here: what is being written has another name until it is
-complete, so that a reader, a full disk or a process that is killed never meets a half of it.
+What is being written has another name until it is complete. So a reader, a full disk or a process
+that is killed never leads to half a file under the real name.
+
+Examples
+--------
+>>> import tempfile
+>>> with tempfile.TemporaryDirectory() as folder:
+...     path = Path(folder) / "shot.json"
+...     write_text(path, "{}")
+...     [file.name for file in Path(folder).iterdir()]
+['shot.json']
 """
 
 from __future__ import annotations
@@ -24,8 +33,25 @@ OLD = ".old"
 
 @contextlib.contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """The path to write to instead of `path`: it takes that name at the end, or is removed where
-    the writing fails. Raises OSError; makes the folders above."""
+    """Give a path to write to, and rename it to `path` once the writing has succeeded.
+
+    If the writing fails, the partial file is removed and an older file at `path` stays.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write. Missing folders above it are made.
+
+    Yields
+    ------
+    Path
+        The name to write to meanwhile: `path` with `.part` added.
+
+    Raises
+    ------
+    OSError
+        The folder cannot be made, or the file cannot be renamed.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(path.name + PART)
     try:
@@ -38,16 +64,37 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all. Raises OSError."""
+    """Write a text file in UTF-8, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+    text : str
+
+    Raises
+    ------
+    OSError
+        The file cannot be written.
+    """
     with whole(path) as partial:
         partial.write_text(text, encoding="utf-8")
 
 
 def settle(folder: Path) -> None:
-    """Bring back what stood at `folder` where a process was killed while it was being replaced.
+    """Bring back the folder that a killed process was about to replace.
 
-    Between the two renames of `replace_folder` there is nothing of that name: the folder is then
-    still there as `.old`. Raises OSError.
+    `replace_folder` renames twice. Between the two renames no folder has the name `folder`, and the
+    older folder is still there with `.old` added to its name.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder that was to be replaced.
+
+    Raises
+    ------
+    OSError
+        A folder cannot be renamed or removed.
     """
     old = folder.with_name(folder.name + OLD)
     if not old.exists():
@@ -59,8 +106,20 @@ def settle(folder: Path) -> None:
 
 
 def replace_folder(complete: Path, folder: Path) -> None:
-    """Put a complete folder where another one is, which goes. Raises OSError; then the one that
-    was there still is."""
+    """Put a complete folder in the place of another one, and remove that one.
+
+    Parameters
+    ----------
+    complete : Path
+        The new folder, under another name beside `folder`.
+    folder : Path
+        The name that it takes.
+
+    Raises
+    ------
+    OSError
+        A folder cannot be renamed. The older folder then still has its name.
+    """
     settle(folder)
     old = folder.with_name(folder.name + OLD)
     if folder.exists():
@@ -71,15 +130,28 @@ def replace_folder(complete: Path, folder: Path) -> None:
         if old.exists():
             old.rename(folder)
         raise
-    # what is left of it is found and removed by the next one
+    # if a file of the older folder is still open, the next call removes what is left
     shutil.rmtree(old, ignore_errors=True)
 
 
 class Lock:
-    """Holds a folder for one process: `with Lock(folder, "capturing"):` and so on.
+    """Holds a folder for one process, as a context manager.
 
-    The operating system lets go of it when the process ends, however it ends. Raises BusyError,
-    naming who holds it, and OSError where the folder cannot be written.
+    The operating system lets go of the lock when the process ends, however it ends.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder to hold; it is made if it is missing.
+    doing : str
+        What the process does there, for the messages of others: "capturing".
+
+    Raises
+    ------
+    BusyError
+        Another process holds the folder. The message names it.
+    OSError
+        The folder cannot be written.
     """
 
     NAME = "lock"
@@ -114,7 +186,7 @@ class Lock:
         at: TracebackType | None,
     ) -> None:
         if self._file:
-            # emptied, not removed: another process may have it open already, to lock it
+            # the file is emptied and kept: another process may have opened it to lock it
             with contextlib.suppress(OSError):
                 self._file.truncate(0)
             self._file.close()
@@ -122,7 +194,17 @@ class Lock:
 
     @staticmethod
     def holder(folder: Path) -> str:
-        """Who holds the folder, in words; empty for nobody."""
+        """Say which process holds a folder.
+
+        Parameters
+        ----------
+        folder : Path
+
+        Returns
+        -------
+        str
+            What the process does and its number; empty where no process holds the folder.
+        """
         path = folder / Lock.NAME
         if not path.is_file():
             return ""
@@ -137,7 +219,7 @@ class Lock:
             return ""
 
 
-# Windows locks bytes and lets nobody else read them: one far behind the text is locked.
+# Windows locks bytes, and locked bytes cannot be read: so a byte far behind the text is locked.
 _BYTE = 1 << 20
 
 if sys.platform == "win32":
@@ -154,7 +236,10 @@ else:
 
 
 def _lock_soon(file: IO[str]) -> None:
-    """Lock it; who only looks whether it is locked (`Lock.holder`) is gone in a moment."""
+    """Lock a file, and try again for a moment where that fails.
+
+    `Lock.holder` locks the file only to see whether it can, and lets go at once.
+    """
     for _ in range(4):
         with contextlib.suppress(OSError):
             return _lock(file)

@@ -1,4 +1,11 @@
-"""Errors between a picture and its reference."""
+"""Errors between a picture and its reference.
+
+Examples
+--------
+>>> reference = np.full((2, 2, 3), 0.5)
+>>> round(mean_relative_error(1.1 * reference, reference), 3)
+0.099
+"""
 
 from __future__ import annotations
 
@@ -7,10 +14,19 @@ from numpy.typing import NDArray
 
 
 def relative_error(picture: NDArray, reference: NDArray, mask: NDArray | None = None) -> NDArray:
-    """|x - ref| / (ref + 1% of the mean of ref), per pixel and channel.
+    """Compute the relative error |x - ref| / (ref + 0.01 mean(ref)) of each pixel and channel.
 
-    picture, reference: (H, W, 3) scene-linear; mask: (H, W) bool, the pixels that the mean is
-    taken over and that count -> (n, 3) float64 of the pixels inside the mask.
+    Parameters
+    ----------
+    picture, reference : (H, W, 3) float
+        Scene-linear radiance.
+    mask : (H, W) bool, optional
+        The pixels that count, in the result and in the mean of the reference.
+
+    Returns
+    -------
+    (n, 3) float64
+        The errors of the n pixels inside the mask.
     """
     if mask is None:
         mask = np.ones(reference.shape[:2], bool)
@@ -19,18 +35,45 @@ def relative_error(picture: NDArray, reference: NDArray, mask: NDArray | None = 
 
 
 def mean_relative_error(picture: NDArray, reference: NDArray, mask: NDArray | None = None) -> float:
-    """The mean of `relative_error`: the one figure that this project quotes first."""
+    """Compute the mean of `relative_error`, the figure that this project quotes first.
+
+    Parameters
+    ----------
+    picture, reference : (H, W, 3) float
+        Scene-linear radiance.
+    mask : (H, W) bool, optional
+        The pixels that count.
+
+    Returns
+    -------
+    float
+    """
     return float(relative_error(picture, reference, mask).mean())
 
 
 def relative_squares(
     picture: NDArray, one: NDArray, two: NDArray, mask: NDArray | None = None
 ) -> NDArray:
-    """(x - a)(x - b) / (ref + 1% of the mean of ref)^2, per pixel and channel.
+    """Compute (x - a)(x - b) / (ref + 0.01 mean(ref))^2 of each pixel and channel, with two
+    references.
 
-    one, two: independent renders of the same picture, (H, W, 3); ref is their mean. Their noise
-    has no part in the mean of this but through the weights (which may so be below 0 for a picture
-    better than they are); it is relMSE -> (n, 3) float64 of the pixels inside the mask.
+    The mean of the result is relMSE without the noise of the references: their noise is
+    independent, so it cancels in the product, except for its part in the weights. For a picture
+    that is better than the references the mean can therefore be slightly below 0.
+
+    Parameters
+    ----------
+    picture : (H, W, 3) float
+        x, scene-linear radiance.
+    one, two : (H, W, 3) float
+        a and b, renders of the same picture with independent noise. ref is their mean.
+    mask : (H, W) bool, optional
+        The pixels that count.
+
+    Returns
+    -------
+    (n, 3) float64
+        The values of the n pixels inside the mask.
     """
     if mask is None:
         mask = np.ones(picture.shape[:2], bool)
@@ -40,6 +83,17 @@ def relative_squares(
 
 
 def trimmed_mean(values: NDArray, share: float = 1e-3) -> float:
-    """The mean without the largest `share` of the values."""
+    """Compute the mean without the largest values.
+
+    Parameters
+    ----------
+    values : array of float
+    share : float
+        The share of the values that is left out.
+
+    Returns
+    -------
+    float
+    """
     ordered = np.sort(values, axis=None)
     return float(ordered[: max(1, ordered.size - round(share * ordered.size))].mean())

@@ -1,7 +1,7 @@
-"""The shot: which picture of which scene a capture, a field and a plate are of.
+"""The shot: the picture of a scene that a capture, a field and a plate belong to.
 
-A shot is told from another by what is in the picture's frame: the scene, the camera and its lens,
-the frame, the size. What the scene looks like is not part of it: that is its fingerprint.
+The identity of a shot is what decides the picture's frame: the scene, the camera and its lens, the
+frame and the size. The look of the scene is kept apart from it, in the fingerprint.
 """
 
 from __future__ import annotations
@@ -16,24 +16,45 @@ from .errors import ShotError
 
 # Names that Windows keeps for devices, whatever ending they have.
 _DEVICES = {"CON", "PRN", "AUX", "NUL"} | {f"{n}{i}" for n in ("COM", "LPT") for i in range(1, 10)}
-# What no file system takes, what Blender's own paths give a meaning to (braces, #, %), and `~`,
-# which marks the names that were changed here.
+# Characters that file systems refuse, characters that have a meaning in Blender's paths (braces, #,
+# %), and `~`, which marks the names that were changed here.
 _UNSAFE = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*{}#%~]')
-# Of a name in a folder's name, in bytes: three of them and the files below stay under what Windows
-# takes for a path, and one under what Linux takes for a name.
+# The longest name in bytes. A path of three such folders and a file stays under the limit of
+# Windows for paths, and one such name stays under the limit of Linux for names.
 _LONGEST = 48
 
 
 def short_hash(*texts: str) -> str:
-    """Six letters that tell texts apart."""
+    """Make six letters that tell texts apart.
+
+    Parameters
+    ----------
+    texts : str
+
+    Returns
+    -------
+    str
+        The first six hexadecimal digits of a SHA-256.
+    """
     return hashlib.sha256("\0".join(texts).encode("utf-8", "surrogatepass")).hexdigest()[:6]
 
 
 def safe_name(name: str) -> str:
-    """A folder's name for any text: the text itself where every file system takes it.
+    """Make a name for a folder out of any text.
 
-    Else what is left of it with a mark of the whole, so that two names never come to be one.
+    A text that every file system takes stays as it is. Of another text remains what can be kept,
+    with a mark of the whole text, so that two texts never become one name.
 
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
     >>> safe_name("Scene"), safe_name("shot 010.v2")
     ('Scene', 'shot 010.v2')
     >>> safe_name("a/b") == safe_name("a:b")
@@ -49,11 +70,32 @@ def safe_name(name: str) -> str:
 
 @dataclass(frozen=True)
 class Shot:
-    """A picture of a scene. What an older description does not say is None.
+    """A picture of a scene.
 
-    file: name of the .blend without its ending, empty where it was never saved; scene_id: stays
-    with the scene when it or its file is renamed; region: x, y, width, height of what is rendered
-    of the picture, from the top; camera_matrix: 16 numbers; lens: what else decides the framing.
+    None stands for what an older description does not say.
+
+    Parameters
+    ----------
+    scene : str
+        The scene's name.
+    frame : int
+    width, height : int
+        The size of the picture in pixels.
+    camera_matrix : tuple of 16 float
+        The camera's matrix to the world, row by row.
+    lens : tuple
+        The numbers and names besides the matrix that decide the framing.
+    file : str, optional
+        The name of the .blend file without its ending; empty where it was never saved.
+    scene_id : str, optional
+        Stays with the scene when the scene or its file is renamed.
+    view_layer, camera : str, optional
+    subframe : float, optional
+        The part of a frame after `frame`, 0 to 1.
+    region : tuple of 4 int, optional
+        x, y, width, height of the part of the picture that is rendered; rows from the top.
+    colour_space : str, optional
+        Blender's name of the working colour space.
     """
 
     scene: str
@@ -71,15 +113,35 @@ class Shot:
     colour_space: str | None = None
 
     def to_json(self) -> dict[str, Any]:
+        """Give the shot as an object of a description.
+
+        Returns
+        -------
+        dict
+        """
         return asdict(self)
 
     @staticmethod
     def from_json(data: Any) -> Shot:
-        """From what `to_json` gave, or the version before it. Raises ShotError."""
+        """Read a shot from an object of a description, of this version or the one before.
+
+        Parameters
+        ----------
+        data : dict
+
+        Returns
+        -------
+        Shot
+
+        Raises
+        ------
+        ShotError
+            The object is no description of a shot, or a value of it is of the wrong kind.
+        """
         if not isinstance(data, dict):
             raise ShotError(f"this is not the description of a shot: {data!r:.60}")
         if "camera_matrix" not in data and isinstance(data.get("camera"), list):
-            # the version before had the camera's matrix by that name
+            # the version before called the camera's matrix `camera`
             data = {k: v for k, v in data.items() if k != "camera"} | {
                 "camera_matrix": data["camera"]
             }
@@ -119,7 +181,7 @@ class Shot:
 
     @property
     def folders(self) -> tuple[str, str, str]:
-        """The names of its folder, from the outside in: file, scene, camera and frame."""
+        """The names of the shot's folder, from the outside in: file, scene, camera with frame."""
         part = f"_{round(self.subframe * 1000):03d}" if self.subframe else ""
         return (
             safe_name(self.file or "untitled"),
@@ -129,14 +191,23 @@ class Shot:
 
     @property
     def mark(self) -> str:
-        """What its folder's name ends in where another shot has taken the name."""
+        """The ending of the folder's name where another shot has taken the name already."""
         keys = (self.scene_id, self.view_layer, self.camera, self.frame, self.subframe)
         return short_hash(*map(str, keys))
 
     def is_place_of(self, other: Shot) -> bool:
-        """Whether `other` belongs in this one's folder: the same scene, view layer, camera, frame.
+        """Say whether another shot belongs into this shot's folder.
 
-        A camera that was only renamed is the same one.
+        It does if scene, view layer, camera and frame are the same. A camera that has only been
+        renamed is the same one: its matrix and lens tell.
+
+        Parameters
+        ----------
+        other : Shot
+
+        Returns
+        -------
+        bool
         """
         return (
             (self.scene_id, self.view_layer, self.frame, self.subframe or 0)
@@ -147,7 +218,18 @@ class Shot:
         )
 
     def difference(self, now: Shot) -> str | None:
-        """How the shot that is `now` differs from this one, in words; None where it does not."""
+        """Say in words how another shot differs from this one.
+
+        Parameters
+        ----------
+        now : Shot
+            The other shot, as it is now.
+
+        Returns
+        -------
+        str or None
+            None where the two are the same.
+        """
         if None not in (self.scene_id, now.scene_id):
             if self.scene_id != now.scene_id:
                 return f"another scene ({self.scene}, now {now.scene})"
