@@ -1,9 +1,18 @@
 """The hemicube: the cube of light patches around the scene (paper 3 and 4.1).
 
 A face is a square of half-edge 1 at distance 1, in the hemicube's own frame: x right, y away from
-the camera, z up. Each face carries a regular grid of patches, or patches of different size (the
-`leaves` of a quadtree, see `refine`); a patch has coordinates u, v in [0, 1] that are linear on the
-face. Patches of a grid are numbered face by face, row by row from below.
+the camera, z up. A face carries a regular grid of patches, or the leaves of a quadtree (`refine`).
+A patch has coordinates u, v in [0, 1] that are linear on the face. Patches of a grid are numbered
+face by face, and row by row from below.
+
+Examples
+--------
+>>> cube = Hemicube(patches=2)
+>>> len(cube), round(float(cube.solid_angles.sum() / np.pi), 6)
+(24, 4.0)
+>>> patch, u, v = cube.locate(np.array([[0.5, 0.5, 1.0]]))
+>>> cube.patch_name(int(patch[0])), float(u[0]), float(v[0])
+('top 0,1', 0.5, 0.5)
 """
 
 from __future__ import annotations
@@ -17,42 +26,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import HemicubeError
+from .faces import FACE_NAMES, FACES, FINEST, LEAF_SIDES, SIDES, Leaf
 from .measure import Extent, uniform_moments
-
-# name -> (centre, direction of u, direction of v); seen from inside, v is up on the four sides.
-FACES: dict[str, tuple[tuple[int, int, int], ...]] = {
-    "top": ((0, 0, 1), (1, 0, 0), (0, -1, 0)),
-    "left": ((-1, 0, 0), (0, 1, 0), (0, 0, 1)),
-    "right": ((1, 0, 0), (0, -1, 0), (0, 0, 1)),
-    "back": ((0, 1, 0), (1, 0, 0), (0, 0, 1)),
-    "front": ((0, -1, 0), (-1, 0, 0), (0, 0, 1)),
-    "bottom": ((0, 0, -1), (1, 0, 0), (0, 1, 0)),
-}
-FACE_NAMES = tuple(FACES)
-SIDES = ("left", "right", "back", "front")
-# The paper's monitors (no side behind the camera), and everything.
-PRESETS: dict[str, tuple[str, ...]] = {
-    "paper": ("top", "left", "right", "back"),
-    "full": FACE_NAMES,
-}
-
-# A patch of a quadtree: face, patches a side if all were of its size, row, column.
-Leaf = tuple[str, int, int, int]
-FINEST = 16
-LEAF_SIDES = (1, 2, 4, 8, FINEST)
 
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
 class Hemicube:
-    """Geometry of the light around a scene; everything that a direction needs to find its patch.
+    """The geometry of the light around a scene: K patches, of which k is the number of one.
 
-    faces: subset of `FACE_NAMES`; patches: patches a side; half_sides: sides only above the
-    horizon, with half as many rows; orientation: rotation, own frame to world (rows of a 3x3);
-    centre, size: position and half-edge in scene units; leaves: patches of different size instead
-    of the grid (`patches` is then only what they were made from). Directions without a leaf have no
-    patch.
+    Parameters
+    ----------
+    faces : tuple of str
+        A subset of `FACE_NAMES`. A direction that meets no face has no patch.
+    patches : int
+        Patches a side of a face, 1 to 16.
+    half_sides : bool
+        Whether the sides exist only above the horizon, with half as many rows.
+    orientation : 3 rows of 3 float
+        The rotation from the hemicube's frame to the world.
+    centre : tuple of 3 float
+        In scene units.
+    size : float
+        The half-edge in scene units.
+    leaves : tuple of Leaf
+        Patches of a quadtree in place of the grid. A direction that meets no leaf has no patch.
+
+    Raises
+    ------
+    HemicubeError
+        A value is out of bounds, or leaves overlap.
     """
 
     faces: tuple[str, ...] = FACE_NAMES
@@ -92,10 +96,32 @@ class Hemicube:
             raise HemicubeError("the orientation of the hemicube must be a rotation")
 
     def to_json(self) -> dict[str, Any]:
+        """Give the hemicube as an object of a description.
+
+        Returns
+        -------
+        dict
+        """
         return asdict(self)
 
     @staticmethod
     def from_json(data: dict[str, Any]) -> Hemicube:
+        """Read a hemicube from an object of a description.
+
+        Parameters
+        ----------
+        data : dict
+
+        Returns
+        -------
+        Hemicube
+
+        Raises
+        ------
+        HemicubeError
+            The object describes no hemicube.
+        """
+
         def number(value: Any, kinds: tuple[type, ...] = (int, float)) -> Any:
             if type(value) not in kinds or not math.isfinite(value):
                 raise TypeError(f"{value!r:.40} is no number")
@@ -130,7 +156,7 @@ class Hemicube:
 
     @cached_property
     def grid(self) -> tuple[tuple[str, int, int], ...]:
-        """(face, row, column) of each patch; rows and columns of a leaf are those of its size."""
+        """(face, row, column) of each patch. Those of a leaf count leaves of its size."""
         if self.leaves:
             return tuple((face, row, column) for face, _, row, column in self.leaves)
         return tuple(
@@ -144,17 +170,37 @@ class Hemicube:
         return len(self.grid)
 
     def face_slice(self, face: str) -> slice:
-        """Where the patches of `face` of a grid stand among all."""
+        """Find the patches of a face of a grid.
+
+        Parameters
+        ----------
+        face : str
+
+        Returns
+        -------
+        slice
+            Into the patches.
+        """
         start = next(k for k, (f, _, _) in enumerate(self.grid) if f == face)
         return slice(start, start + self._rows(face) * self.patches)
 
     def patch_name(self, k: int) -> str:
+        """Name a patch for messages.
+
+        Parameters
+        ----------
+        k : int
+
+        Returns
+        -------
+        str
+        """
         face, row, column = self.grid[k]
         return f"{face} {row},{column}" + (f" of {self.leaves[k][1]}" if self.leaves else "")
 
     @cached_property
     def table(self) -> NDArray[np.int32]:
-        """(F, 16, 16): the leaf that each cell of the finest grid lies in, -1 for none."""
+        """(F, 16, 16) int32: the leaf in which each cell of the finest grid lies, or -1."""
         out = np.full((len(self.faces), FINEST, FINEST), -1, np.int32)
         for k, (face, n, row, column) in enumerate(self.leaves):
             s = FINEST // n
@@ -163,14 +209,14 @@ class Hemicube:
 
     @cached_property
     def sides(self) -> NDArray[np.intp]:
-        """(K,): patches a side if all were of this one's size."""
+        """(K,) int: for each patch, how many patches of its size make up a side of the face."""
         if self.leaves:
             return np.array([n for _, n, _, _ in self.leaves], np.intp)
         return np.full(len(self), self.patches, np.intp)
 
     @cached_property
     def extents(self) -> NDArray[np.float64]:
-        """(K, 4): x0, x1, y0, y1 of each patch on its face, where the face is [-1, 1]^2."""
+        """(K, 4) float64: x0, x1, y0, y1 of each patch on its face, which is [-1, 1]^2."""
         out = np.empty((len(self), 4))
         for k, (_, n, row, column) in enumerate(self.leaves):
             edges = np.array((column, column + 1, row, row + 1), np.float64)
@@ -189,18 +235,49 @@ class Hemicube:
         return out
 
     def frame(self, face: str) -> NDArray[np.float64]:
-        """(3, 3): centre, u and v direction of a face in world space, as rows."""
+        """Compute the frame of a face in the world.
+
+        Parameters
+        ----------
+        face : str
+
+        Returns
+        -------
+        (3, 3) float64
+            As rows: the centre, the direction of u and the direction of v.
+        """
         return np.array(FACES[face], np.float64) @ np.array(self.orientation).T
 
     def corners(self, k: int) -> NDArray[np.float64]:
-        """(4, 3): the corners of a patch relative to the centre, for half-edge 1, at
-        (u, v) = (0,0), (1,0), (1,1), (0,1)."""
+        """Compute the corners of a patch.
+
+        Parameters
+        ----------
+        k : int
+
+        Returns
+        -------
+        (4, 3) float64
+            At (u, v) = (0, 0), (1, 0), (1, 1), (0, 1), relative to the centre, for half-edge 1.
+        """
         x0, x1, y0, y1 = self.extents[k]
         c, eu, ev = self.frame(self.grid[k][0])
         return np.array([c + x * eu + y * ev for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))])
 
     def directions(self, k: int, u: NDArray, v: NDArray) -> NDArray[np.float64]:
-        """Unit directions in the world of the points (u, v) of patch k -> (..., 3)."""
+        """Compute the directions in the world of points of a patch.
+
+        Parameters
+        ----------
+        k : int
+        u, v : (...) float
+            Patch coordinates.
+
+        Returns
+        -------
+        (..., 3) float64
+            Unit vectors.
+        """
         x0, x1, y0, y1 = self.extents[k]
         c, eu, ev = self.frame(self.grid[k][0])
         x = np.asarray(x0 + (x1 - x0) * np.asarray(u, np.float64))[..., None]
@@ -209,9 +286,19 @@ class Hemicube:
         return d / np.linalg.norm(d, axis=-1, keepdims=True)
 
     def locate(self, directions: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-        """The patch that each direction meets, and where.
+        """Find the patch that each direction meets.
 
-        directions: (..., 3), any length -> patch (int32, -1 where there is none), u, v.
+        Parameters
+        ----------
+        directions : (..., 3) float
+            In the world, of any length.
+
+        Returns
+        -------
+        patch : (...) int32
+            The number of the patch, or -1.
+        u, v : (...) float
+            Patch coordinates, of the dtype of `directions`.
         """
         local = np.moveaxis(directions @ np.array(self.orientation, directions.dtype), -1, 0)
         major = np.abs(local).argmax(axis=0)
@@ -250,7 +337,7 @@ class Hemicube:
 
     @cached_property
     def solid_angles(self) -> NDArray[np.float64]:
-        """(K,) steradians of each patch seen from the centre, in closed form."""
+        """(K,) float64: the steradians of each patch seen from the centre, in closed form."""
         x0, x1, y0, y1 = self.extents.T
 
         def corner(x: NDArray, y: NDArray) -> NDArray:
@@ -259,23 +346,54 @@ class Hemicube:
         return corner(x1, y1) - corner(x0, y1) - corner(x1, y0) + corner(x0, y0)
 
     def extent(self, k: int) -> Extent:
-        """x0, x1, y0, y1 of patch k on its face: a row of `extents`, to measure its light by."""
+        """Give the place of a patch on its face, a row of `extents`.
+
+        Parameters
+        ----------
+        k : int
+
+        Returns
+        -------
+        tuple of 4 float
+            x0, x1, y0, y1.
+        """
         x0, x1, y0, y1 = (float(x) for x in self.extents[k])
         return x0, x1, y0, y1
 
     def uniform_moments(self, k: int) -> NDArray[np.float64]:
-        """(6,) moments, over the zeroth, of a transport that sees all of patch k evenly by solid
-        angle, in the order of `patterns.MONOMIALS`: a light path's measure, not the face's area."""
+        """Compute the moments of a transport that sees all of a patch evenly by solid angle.
+
+        Parameters
+        ----------
+        k : int
+
+        Returns
+        -------
+        (6,) float64
+            Moments over the zeroth, in the order of `patterns.MONOMIALS`.
+        """
         return uniform_moments(self.extent(k))
 
     @property
     def closed(self) -> bool:
-        """Whether there is a patch in every direction."""
+        """Whether every direction has a patch."""
         if self.leaves:
             return len(self.faces) == len(FACE_NAMES) and bool((self.table >= 0).all())
         return len(self.faces) == len(FACE_NAMES) and not self.half_sides
 
     def parallax_degrees(self, radius: float) -> float:
-        """How far the direction to a patch point differs between the centre of the scene and its
-        rim: the error of taking a near hemicube for an environment at infinity."""
+        """Compute how far the direction to a patch differs between the scene's centre and its rim.
+
+        This is the error of taking the hemicube for an environment at infinity.
+
+        Parameters
+        ----------
+        radius : float
+            The radius of the scene, in scene units.
+
+        Returns
+        -------
+        float
+            Degrees.
+        """
         return math.degrees(math.atan2(radius, self.size))

@@ -1,10 +1,16 @@
-"""The measure of light on a patch: solid angle, and not area.
+"""The measure of light on a patch: solid angle, not area.
 
-A patch's coordinates u, v are linear on its face, and patterns are polynomials of them; equal areas
-of the face are not equal solid angles. At (x, y) on the face, where the face is [-1, 1]^2 at
-distance 1, an area counts (1 + x^2 + y^2)^(-3/2). So a transport that sees its whole patch evenly
-has its mean off the patch's middle, by up to 0.074 of a patch that is a quarter of its face, and a
-box is not where its area's moments say (docs/identifiability.md).
+A patch's coordinates u, v are linear on its face, and patterns are polynomials of u and v. Equal
+areas of a face have different solid angles: at (x, y) on the face [-1, 1]^2 at distance 1, the
+density of solid angle is (1 + x^2 + y^2)^(-3/2). So the moments of a transport that sees its whole
+patch evenly have their mean off the patch's middle, by up to 0.074 of a patch that is a quarter of
+its face. For the same reason a box must be fitted with this density (docs/identifiability.md).
+
+Examples
+--------
+>>> quarter = (0.0, 1.0, 0.0, 1.0)
+>>> [round(float(m), 3) for m in uniform_moments(quarter)]
+[1.0, 0.426, 0.258, 0.426, 0.258, 0.184]
 """
 
 from __future__ import annotations
@@ -18,23 +24,23 @@ from numpy.typing import NDArray
 # x0, x1, y0, y1 of a patch on its face, see `Hemicube.extents`.
 Extent = tuple[float, float, float, float]
 
-# Relative error that averages may have: what a fitted box is then off by is under 1e-5 of a patch.
+# The relative error of averages. A fitted box is then off by less than 1e-5 of a patch.
 ACCURACY = 1e-7
-# Boxes are good to this, in patch widths: less than the sixteen bits that a field keeps them in.
+# The accuracy of boxes in patch widths. A field keeps them in sixteen bits, which is coarser.
 CLOSE = 2e-6
-# Steps after which a box is taken as it is; one that fits the moments takes 3 to 14.
+# The most steps for a box. A box that has such moments is found in 3 to 14.
 STEPS = 24
-# Boxes worked on at a time: their quadrature fits the cache.
+# Boxes worked on at a time, so that their quadrature fits the cache.
 BLOCK = 2048
 
 
 @lru_cache(maxsize=64)
 def _nodes(low: float, high: float, accuracy: float) -> tuple[NDArray, NDArray]:
-    """Gauss-Legendre places in [-1, 1] and weights, of sum 1, that are good to `accuracy` from
-    `low` to `high` on a face.
+    """Gauss-Legendre places in [-1, 1] and weights of sum 1, good to `accuracy` from `low` to
+    `high`.
 
-    The density has its nearest pole at a distance of 1 from the face's middle line, off the real
-    axis; the ellipse through it says how fast the sum converges.
+    The density's poles nearest to the real axis are at a distance of 1 from the face's middle line.
+    The ellipse through them determines how fast the quadrature converges.
     """
     half = (high - low) / 2
     ellipse = 1 / half + math.hypot(1, 1 / half)
@@ -44,8 +50,10 @@ def _nodes(low: float, high: float, accuracy: float) -> tuple[NDArray, NDArray]:
 
 
 def _local(boxes: NDArray, extent: Extent, accuracy: float) -> tuple[NDArray, ...]:
-    """Averages of s, s^2, t, t^2 and st by solid angle over boxes (n, 4) -> five (n,); s and t run
-    from -1 to 1 over each box, so that nothing cancels in a narrow one."""
+    """Averages of s, s^2, t, t^2 and st by solid angle over boxes (n, 4) -> five arrays (n,).
+
+    s and t run from -1 to 1 over each box, so that nothing cancels in a narrow box.
+    """
     x0, x1, y0, y1 = extent
     u0, u1, v0, v1 = boxes.T
     s, ws = _nodes(x0, x1, accuracy)
@@ -69,9 +77,21 @@ def _local(boxes: NDArray, extent: Extent, accuracy: float) -> tuple[NDArray, ..
 
 
 def box_averages(boxes: NDArray, extent: Extent, accuracy: float = ACCURACY) -> NDArray[np.float64]:
-    """Averages of the six monomials by solid angle over boxes of a patch.
+    """Average the six monomials by solid angle over boxes of a patch.
 
-    boxes: (..., 4), u0, u1, v0, v1 in patch coordinates; accuracy: relative -> (6, ...).
+    Parameters
+    ----------
+    boxes : (..., 4) float
+        u0, u1, v0, v1 in patch coordinates.
+    extent : tuple of 4 float
+        The place of the patch on its face, see `Hemicube.extents`.
+    accuracy : float
+        The relative error that is allowed.
+
+    Returns
+    -------
+    (6, ...) float64
+        In the order of `patterns.MONOMIALS`.
     """
     flat = np.asarray(boxes, np.float64).reshape(-1, 4)
     out = np.empty((6, len(flat)))
@@ -93,7 +113,18 @@ def box_averages(boxes: NDArray, extent: Extent, accuracy: float = ACCURACY) -> 
 
 @lru_cache(maxsize=4096)
 def uniform_moments(extent: Extent) -> NDArray[np.float64]:
-    """(6,) moments over the zeroth of a transport that sees its whole patch evenly, to 1e-12."""
+    """Compute the moments of a transport that sees its whole patch evenly by solid angle.
+
+    Parameters
+    ----------
+    extent : tuple of 4 float
+        The place of the patch on its face.
+
+    Returns
+    -------
+    (6,) float64
+        Moments over the zeroth, to 1e-12; read-only.
+    """
     out = box_averages(np.array([0.0, 1.0, 0.0, 1.0]), extent, 1e-13)
     out.flags.writeable = False
     return out
@@ -102,11 +133,25 @@ def uniform_moments(extent: Extent) -> NDArray[np.float64]:
 def box_of(
     mean: tuple[NDArray, NDArray], variance: tuple[NDArray, NDArray], extent: Extent
 ) -> NDArray[np.float64]:
-    """The boxes, even in solid angle, of these means and variances along u and v -> (n, 4).
+    """Find the boxes, uniform by solid angle, that have some means and variances.
 
-    Where the density is flat, half the width is the root of three variances; how far it is not, in
-    the box that was found, corrects the next one. What is spread wider than any box, light from
-    both rims, is cut at the patch.
+    Where the density is constant, the half width of a box is the root of three variances. The
+    deviation from that is measured in the box that was found, and corrects the next one. A spread
+    wider than any box on the patch can have (light from both rims) gives the whole patch.
+
+    Parameters
+    ----------
+    mean : pair of (n,) float
+        Along u and along v, in patch coordinates.
+    variance : pair of (n,) float
+        Along u and along v.
+    extent : tuple of 4 float
+        The place of the patch on its face.
+
+    Returns
+    -------
+    (n, 4) float64
+        u0, u1, v0, v1.
     """
     n = len(mean[0])
     places = np.stack([*mean, *variance])
@@ -134,7 +179,7 @@ def box_of(
 
 
 def _corrected(boxes: NDArray, places: NDArray, extent: Extent) -> NDArray:
-    """Boxes (n, 4) of these means and variances (4, n), if the density is what it is in `boxes`."""
+    """Boxes (n, 4) of some means and variances (4, n), for the density inside `boxes`."""
     s, ss, t, tt, _ = _local(boxes, extent, ACCURACY)
     edges = []
     for axis, (first, second) in enumerate(((s, ss), (t, tt))):

@@ -1,9 +1,17 @@
 """Illumination patterns: what a patch shows, as polynomials of its coordinates (paper 4.3).
 
-Every pattern here is a polynomial of degree two in the patch's coordinates u, v in [0, 1]: a row of
-coefficients over `MONOMIALS`. The basis image of a pattern is then that same combination of the
-*moments* of the light's path from patch to pixel, and a set of patterns is known by its matrix:
-what it can see is its row space (see docs/identifiability.md).
+Every pattern is a polynomial of degree two in the patch's coordinates u, v in [0, 1]: a row of
+coefficients over `MONOMIALS`. The basis image of a pattern is the same combination of the moments
+of the light's path from patch to pixel. So a set of patterns is described by its matrix, and the
+moments that it can tell are those in the row space of the matrix (docs/identifiability.md).
+
+Examples
+--------
+>>> paper = pattern_set("paper")
+>>> len(paper), paper.rank
+(9, 5)
+>>> paper.identified
+(True, True, False, True, False, True)
 """
 
 from __future__ import annotations
@@ -21,14 +29,34 @@ ONE, U, UU, V, VV, UV = range(6)
 
 
 def monomials(u: NDArray, v: NDArray) -> NDArray:
-    """The six monomials at patch coordinates `u`, `v` (any equal shapes) -> (6, ...)."""
+    """Evaluate the six monomials 1, u, u^2, v, v^2, uv.
+
+    Parameters
+    ----------
+    u, v : (...) float
+        Patch coordinates, of shapes that broadcast.
+
+    Returns
+    -------
+    (6, ...) float
+        In the order of `MONOMIALS`.
+    """
     u, v = np.broadcast_arrays(u, v)
     return np.stack([np.ones_like(u), u, u * u, v, v * v, u * v])
 
 
 @dataclass(frozen=True)
 class PatternSet:
-    """P patterns: their names and their coefficients over `MONOMIALS`, a (P, 6) tuple."""
+    """A set of P patterns.
+
+    Parameters
+    ----------
+    name : str
+    patterns : tuple of str
+        The names of the patterns.
+    coefficients : tuple of P tuples of 6 float
+        Their coefficients over `MONOMIALS`.
+    """
 
     name: str
     patterns: tuple[str, ...]
@@ -39,16 +67,29 @@ class PatternSet:
 
     @cached_property
     def matrix(self) -> NDArray[np.float64]:
-        """(P, 6): basis image p = sum over monomials of matrix[p, m] * moment m."""
+        """(P, 6) float64: basis image p is the sum of matrix[p, m] times moment m over the
+        monomials m.
+        """
         return np.array(self.coefficients, np.float64)
 
     def radiance(self, u: NDArray, v: NDArray) -> NDArray:
-        """What each pattern emits at (u, v), between 0 and 1 -> (P, ...)."""
+        """Evaluate what each pattern emits.
+
+        Parameters
+        ----------
+        u, v : (...) float
+            Patch coordinates.
+
+        Returns
+        -------
+        (P, ...) float
+            Radiance between 0 and 1.
+        """
         return np.tensordot(self.matrix, monomials(u, v), axes=1)
 
     @cached_property
     def rank(self) -> int:
-        """How many independent numbers the set measures."""
+        """The number of independent combinations of moments that the set measures."""
         return int(np.linalg.matrix_rank(self.matrix))
 
     @cached_property
@@ -58,7 +99,17 @@ class PatternSet:
         return float(s[0] / s[-1])
 
     def sees(self, functional: NDArray | tuple[float, ...]) -> bool:
-        """Whether a combination of moments (6 coefficients) can be told from the basis images."""
+        """Say whether a combination of moments can be computed from the basis images.
+
+        Parameters
+        ----------
+        functional : (6,) float
+            The coefficients of the combination over `MONOMIALS`.
+
+        Returns
+        -------
+        bool
+        """
         f = np.asarray(functional, np.float64)
         projected = self._pseudo_inverse @ self.matrix
         return bool(np.allclose(f @ projected, f, atol=1e-9))
@@ -69,11 +120,24 @@ class PatternSet:
 
     @cached_property
     def identified(self) -> tuple[bool, ...]:
-        """For each of `MONOMIALS`, whether its moment can be told on its own."""
+        """For each of `MONOMIALS`, whether its moment can be computed from the basis images."""
         return tuple(self.sees(row) for row in np.eye(6))
 
     def require(self, wanted: tuple[int, ...], what: str) -> None:
-        """Raise PatternError unless every monomial index in `wanted` is identified."""
+        """Check that the set identifies some moments.
+
+        Parameters
+        ----------
+        wanted : tuple of int
+            Indices into `MONOMIALS`.
+        what : str
+            What needs the moments, for the message.
+
+        Raises
+        ------
+        PatternError
+            A moment is not identified. The message names the pattern sets that would do.
+        """
         missing = [MONOMIALS[m] for m in wanted if not self.identified[m]]
         if missing:
             able = [s for s in PATTERN_SETS.values() if all(s.identified[m] for m in wanted)]
@@ -85,7 +149,26 @@ class PatternSet:
             )
 
     def coefficient(self, basis: NDArray) -> NDArray:
-        """The zeroth moment alone, the reflection coefficient: (P, ...) basis images -> (...)."""
+        """Compute the reflection coefficient R, the zeroth moment.
+
+        Parameters
+        ----------
+        basis : (P, ...) float
+            Basis images, scene-linear radiance.
+
+        Returns
+        -------
+        (...) float
+
+        Raises
+        ------
+        PatternError
+            The set does not identify the zeroth moment.
+
+        Source
+        ------
+        Paper 3.
+        """
         self.require((ONE,), "a reflection coefficient")
         if self.shown_by is not None:
             return basis[self.shown_by]
@@ -93,17 +176,32 @@ class PatternSet:
 
     @cached_property
     def shown_by(self) -> int | None:
-        """The pattern whose basis image is the reflection coefficient itself; None where it takes
-        several."""
+        """The number of the pattern whose basis image is the reflection coefficient itself.
+
+        None where the coefficient is a combination of several basis images.
+        """
         row = self._pseudo_inverse[ONE]
         only = row[0] == 1 and not np.abs(row[1:]).max(initial=0) > 1e-12
         return 0 if only and self.identified[ONE] else None
 
     def moments(self, basis: NDArray) -> NDArray:
-        """Moments from basis images.
+        """Compute the moments from basis images.
 
-        basis: (P, ...) radiance in each pattern's light -> (6, ...) of the same dtype; a moment
-        that the set cannot identify is NaN, so that nobody uses it by mistake.
+        Parameters
+        ----------
+        basis : (P, ...) float
+            Radiance in the light of each pattern, scene-linear.
+
+        Returns
+        -------
+        (6, ...) float
+            Of the dtype of `basis`. A moment that the set does not identify is NaN, so that nothing
+            uses it by mistake.
+
+        Raises
+        ------
+        PatternError
+            `basis` has another number of patterns.
         """
         if basis.shape[0] != len(self):
             raise PatternError(
@@ -116,8 +214,8 @@ class PatternSet:
             if not identified:
                 moment[...] = np.nan
                 continue
-            # term by term: most rows have one, and a product of matrices so thin keeps a library's
-            # threads busy with waiting for each other
+            # term by term, because most rows have one term: for a matrix product this thin a
+            # library's threads mostly wait for each other
             first, *others = np.flatnonzero(row)
             np.multiply(basis[first], row[first], out=moment)
             for p in others:
@@ -162,7 +260,21 @@ PATTERN_SETS: dict[str, PatternSet] = {
 
 
 def pattern_set(name: str) -> PatternSet:
-    """The set of that name; PatternError names those that exist."""
+    """Find a pattern set by its name.
+
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    PatternSet
+
+    Raises
+    ------
+    PatternError
+        There is no such set. The message names those that exist.
+    """
     try:
         return PATTERN_SETS[name]
     except KeyError:

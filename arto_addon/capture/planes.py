@@ -13,7 +13,8 @@ import bpy
 import numpy as np
 
 from ...core.capture.names import GRAIN, GROUP, group_name
-from ...core.hemicube import FACE_NAMES, Hemicube
+from ...core.faces import FACE_NAMES
+from ...core.hemicube import Hemicube
 from ...core.patterns import PatternSet, pattern_set
 from ..blender.nodes import Nodes, made_of_nodes, new_material
 from ..stage.stage import Stage, free_mark

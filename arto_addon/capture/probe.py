@@ -9,7 +9,8 @@ import numpy as np
 from ...core.capture.names import GROUP
 from ...core.capture.refine import check, refine
 from ...core.errors import CaptureSetError
-from ...core.hemicube import FINEST, Hemicube
+from ...core.faces import FINEST
+from ...core.hemicube import Hemicube
 from ...core.patterns import pattern_set
 from ..stage.small import parts_of, small
 from ..stage.stage import Stage

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from ...core.faces import FACE_NAMES
 from ...core.fit.choice import CHOICES
-from ...core.hemicube import FACE_NAMES
 from ...core.patterns import PATTERN_SETS
 from .setting import Decides, Item, Setting
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ...core.errors import ArtoError
-from ...core.hemicube import SIDES
+from ...core.faces import SIDES
 from ...core.units import size
 from ..capture import planes
 from ..settings.table import in_panel

@@ -15,7 +15,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ...core.hemicube import FACE_NAMES, PRESETS
+from ...core.faces import FACE_NAMES, PRESETS
 from ..plate import compare
 from ..plate.present import use
 from ..relight import looks

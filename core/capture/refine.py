@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import HemicubeError
-from ..hemicube import FINEST, LEAF_SIDES, Hemicube, Leaf
+from ..faces import FINEST, LEAF_SIDES, Leaf
+from ..hemicube import Hemicube
 from .moments import channel_sum
 
 # Cells (5.6 degrees) over which light stays alike: its correlation falls to 1/e.

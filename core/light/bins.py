@@ -1,4 +1,11 @@
-"""Bins: the small grid on every patch, equal in angle, that an environment map is collected in."""
+"""Bins: the small grid on every patch, equal in angle, that collects an environment map.
+
+Examples
+--------
+>>> u, v = bin_centres(Hemicube(patches=1), 0, 2)
+>>> [round(float(x), 3) for x in u]  # a face spans 90 degrees: +-22.5 degrees at tan 22.5
+[0.293, 0.707]
+"""
 
 from __future__ import annotations
 
@@ -14,7 +21,7 @@ from ..hemicube import Hemicube
 from ..patterns import MONOMIALS, monomials
 from .environment import Environment, directions, sample_directions
 
-# Samples of a map that are worked on at a time, and of one whose bins are kept.
+# Samples of a map that are worked on at a time, and the most samples whose bins are kept.
 BLOCK = 1 << 20
 KEPT = 1 << 22
 _KEPT: dict[tuple, list[Samples]] = {}
@@ -23,9 +30,19 @@ _MONOMIALS: dict[tuple, NDArray[np.float64]] = {}
 
 @dataclass(frozen=True)
 class Samples:
-    """Some rows of a map's texels, sampled: which rows, how many samples a texel's side has, the
-    bin of each sample (rows * finer, columns * finer; -1: no patch), and the solid angle of one of
-    each row of samples."""
+    """Some rows of a map's texels, sampled.
+
+    Parameters
+    ----------
+    rows : slice
+        The rows of texels.
+    finer : int
+        Samples along the side of a texel.
+    bins : (rows * finer, columns * finer) int32
+        The bin of each sample; -1 where no patch is.
+    weight : (rows * finer,) float64
+        The solid angle of one sample of each row, in steradians.
+    """
 
     rows: slice
     finer: int
@@ -34,19 +51,33 @@ class Samples:
 
     @cached_property
     def lit(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """Of the samples that have a bin: which, and their solid angles."""
+        """The bins of the samples that have one, (n,) int, and the solid angles of these samples,
+        (n,).
+        """
         lit = self.bins.ravel() >= 0
         index = self.bins.ravel()[lit].astype(np.intp)
         return index, np.repeat(self.weight, self.bins.shape[1])[lit]
 
     @cached_property
     def solid_angles(self) -> NDArray[np.float64]:
-        """Of each bin up to the last that has samples here, (n,), what they sum to."""
+        """(n,) float64: the summed solid angles of the samples in each bin, up to the last bin used
+        here.
+        """
         return np.bincount(*self.lit)
 
 
 def default_resolution(hemicube: Hemicube, environment: Environment) -> NDArray[np.intp]:
-    """Bins a side of each patch (K,): about one texel of the map each, at least 4."""
+    """Choose the bins a side of each patch: about one texel of the map each, and at least 4.
+
+    Parameters
+    ----------
+    hemicube : Hemicube
+    environment : Environment
+
+    Returns
+    -------
+    (K,) int
+    """
     return np.maximum(4, environment.image.shape[1] // (4 * hemicube.sides))
 
 
@@ -57,16 +88,30 @@ def sample_bins(
     resolutions: NDArray,
     offsets: NDArray,
 ) -> Iterator[Samples]:
-    """The bins of every sample of a map of that size, block by block.
+    """Find the bin of every sample of a map, block by block of rows.
 
-    The same for every map of a size, so those of the last one are kept unless it is large: turning
-    through HDRIs is common.
+    The bins depend on the size of the map alone. Those of the last map are kept unless it is large,
+    because an artist often goes through HDRIs of one size.
+
+    Parameters
+    ----------
+    hemicube : Hemicube
+    height, width : int
+        The size of the map in texels.
+    resolutions : (K,) int
+        Bins a side of each patch.
+    offsets : (K + 1,) int
+        The number of the first bin of each patch.
+
+    Yields
+    ------
+    Samples
     """
     key = (hemicube, height, width, resolutions.tobytes())
     if key in _KEPT:
         yield from _KEPT[key]
         return
-    # two samples a bin and axis on average; a narrow bin may still stay empty
+    # two samples a bin and axis on average; a narrow bin may still have none
     finer = max(1, int(np.ceil(8 * (resolutions * hemicube.sides).max() / width)))
     azimuth, latitude, weight = sample_directions(height, width, finer)
 
@@ -100,7 +145,21 @@ def sample_bins(
 
 
 def bin_centres(hemicube: Hemicube, k: int, resolution: int) -> tuple[NDArray, NDArray]:
-    """Patch coordinates of a patch's bins' centres along u and along v -> (r,), (r,)."""
+    """Compute the centres of a patch's bins.
+
+    Parameters
+    ----------
+    hemicube : Hemicube
+    k : int
+        The number of the patch.
+    resolution : int
+        Bins a side, r.
+
+    Returns
+    -------
+    u, v : (r,) float64
+        Patch coordinates along u and along v.
+    """
     x = hemicube.extents[k]
     mid = (np.arange(resolution) + 0.5) / resolution
     out = []
@@ -111,9 +170,20 @@ def bin_centres(hemicube: Hemicube, k: int, resolution: int) -> tuple[NDArray, N
 
 
 def bin_monomials(hemicube: Hemicube, resolutions: NDArray) -> NDArray[np.float64] | None:
-    """The monomials at the centres of all patches' bins, (6, bins), patch by patch and row by row.
+    """Evaluate the monomials at the centres of all patches' bins.
 
-    The same for every map of a size, so those of the last one are kept. None where they are many.
+    They depend on the resolutions alone, so the last ones are kept.
+
+    Parameters
+    ----------
+    hemicube : Hemicube
+    resolutions : (K,) int
+        Bins a side of each patch.
+
+    Returns
+    -------
+    (6, bins) float64 or None
+        Patch by patch, row by row of v. None where this would take too much memory.
     """
     if len(MONOMIALS) * int((resolutions**2).sum()) > KEPT:
         return None
@@ -133,7 +203,25 @@ def bin_monomials(hemicube: Hemicube, resolutions: NDArray) -> NDArray[np.float6
 def bin_coordinate(
     hemicube: Hemicube, k: NDArray | int, t: NDArray, axis: int, r: NDArray | int
 ) -> NDArray:
-    """Patch coordinate (0..1) -> bin coordinate (0..r), where bins are equal in angle."""
+    """Turn patch coordinates into bin coordinates, in which bins are equal in angle.
+
+    Parameters
+    ----------
+    hemicube : Hemicube
+    k : int or (n,) int
+        The numbers of the patches.
+    t : (n,) float
+        Patch coordinates, 0 to 1.
+    axis : int
+        0 for u, 1 for v.
+    r : int or (n,) int
+        Bins a side.
+
+    Returns
+    -------
+    (n,) float
+        0 to r.
+    """
     low = hemicube.extents[k, 2 * axis]
     high = hemicube.extents[k, 2 * axis + 1]
     start = np.arctan(low)

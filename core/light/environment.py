@@ -1,7 +1,14 @@
 """Environment maps: light from every direction, as an equirectangular image (paper 6).
 
-Rows run top-down (up first) and the directions are those of Cycles: u = 0.5 - atan2(y, x) / 2 pi,
-v = 0.5 + atan2(z, hypot(x, y)) / pi, with v counted from the bottom row. Scene-linear radiance.
+Rows run top-down, the first one looks up. Directions are those of Cycles: u = 0.5 - atan2(y, x) /
+2 pi, v = 0.5 + atan2(z, hypot(x, y)) / pi, with v counted from the bottom row. Texels are
+scene-linear radiance.
+
+Examples
+--------
+>>> sky = Environment.uniform(2.0)
+>>> [round(float(x / np.pi), 6) for x in sky.irradiance()]  # 2 over 4 pi steradians
+[8.0, 8.0, 8.0]
 """
 
 from __future__ import annotations
@@ -19,10 +26,20 @@ from ..errors import EnvironmentMapError
 
 @dataclass(frozen=True)
 class Environment:
-    """An equirectangular map: `image` is (H, W, 3) float32, scene-linear.
+    """An equirectangular map.
 
-    turn: radians by which a direction is turned about the vertical, counterclockwise from above,
-    before it is looked up: turning an HDRI moves no texel.
+    Parameters
+    ----------
+    image : (H, W, 3) float32
+        Scene-linear radiance.
+    turn : float
+        The angle in radians, counterclockwise from above, that is added to the azimuth of a
+        direction before the map is looked up. Turning an HDRI so moves no texel.
+
+    Raises
+    ------
+    EnvironmentMapError
+        The image has another shape, or texels that are not finite.
     """
 
     image: NDArray[np.float32]
@@ -42,14 +59,41 @@ class Environment:
 
     @staticmethod
     def uniform(radiance: float | tuple[float, ...] = 1.0, height: int = 64) -> Environment:
-        """The same radiance from everywhere."""
+        """Make a map of the same radiance in every direction.
+
+        Parameters
+        ----------
+        radiance : float or tuple of 3 float
+        height : int
+            Rows; there are twice as many columns.
+
+        Returns
+        -------
+        Environment
+        """
         image = np.empty((height, 2 * height, 3), np.float32)
         image[:] = radiance
         return Environment(image)
 
     @staticmethod
     def load(path: Path) -> Environment:
-        """An environment map from an EXR file (its first part of three or more channels)."""
+        """Read a map from an EXR file: its first layer of three or more channels.
+
+        Parameters
+        ----------
+        path : Path
+
+        Returns
+        -------
+        Environment
+
+        Raises
+        ------
+        EnvironmentMapError
+            The file has no colour.
+        ExrError
+            The file cannot be read.
+        """
         for pixels in exr.read(path).values():
             if pixels.shape[-1] >= 3:
                 return Environment(np.ascontiguousarray(pixels[..., :3], np.float32))
@@ -57,13 +101,24 @@ class Environment:
 
     @cached_property
     def row_solid_angles(self) -> NDArray[np.float64]:
-        """(H,): steradians of one texel of each row."""
+        """(H,) float64: the steradians of one texel of each row."""
         height, width = self.image.shape[:2]
         edges = np.cos(np.linspace(0, np.pi, height + 1))
         return (edges[:-1] - edges[1:]) * (2 * np.pi / width)
 
     def at(self, directions: NDArray) -> NDArray[np.float32]:
-        """(..., 3) directions, any length -> (..., 3) radiance of the texels that they meet."""
+        """Look up the radiance in some directions.
+
+        Parameters
+        ----------
+        directions : (..., 3) float
+            In the world, of any length.
+
+        Returns
+        -------
+        (..., 3) float32
+            The radiance of the texel that each direction meets.
+        """
         height, width = self.image.shape[:2]
         x, y, z = np.moveaxis(directions, -1, 0)
         azimuth = np.arctan2(y, x) + self.turn
@@ -72,8 +127,17 @@ class Environment:
         return self.image[np.minimum(row, height - 1), column]
 
     def coarser(self, scale: int) -> Environment:
-        """The map with `scale` times fewer texels a side, each the mean over its solid angle; both
-        sides must be multiples of it."""
+        """Make a map with fewer texels, each the mean by solid angle of those that it covers.
+
+        Parameters
+        ----------
+        scale : int
+            How many times fewer texels a side; it divides both sides.
+
+        Returns
+        -------
+        Environment
+        """
         height, width = self.image.shape[:2]
         weights = self.row_solid_angles.reshape(-1, scale)
         blocks = self.image.reshape(height // scale, scale, width // scale, scale, 3)
@@ -82,19 +146,37 @@ class Environment:
 
     @property
     def below_zero(self) -> float:
-        """How much of all that the texels have, by solid angle, is below 0: 0 to 1."""
+        """The share of negative light in all light of the map, by solid angle, 0 to 1."""
         texels = self.row_solid_angles[:, None] * self.image.sum(axis=-1, dtype=np.float64)
         total = float(np.abs(texels).sum())
         return float(-np.minimum(texels, 0).sum()) / total if total > 0 else 0.0
 
     def irradiance(self) -> NDArray[np.float64]:
-        """(3,): radiance integrated over all directions."""
+        """Integrate the radiance over all directions.
+
+        Returns
+        -------
+        (3,) float64
+        """
         rows = self.image.sum(axis=1, dtype=np.float64)
         return self.row_solid_angles @ rows
 
 
 def directions(azimuth: NDArray, latitude: NDArray) -> NDArray[np.float64]:
-    """Unit vectors (H, W, 3) of azimuths (W, 2, unit vectors) and latitudes (H,)."""
+    """Combine azimuths and latitudes into directions.
+
+    Parameters
+    ----------
+    azimuth : (W, 2) float
+        Unit vectors in the horizontal plane.
+    latitude : (H,) float
+        Radians above the horizon.
+
+    Returns
+    -------
+    (H, W, 3) float64
+        Unit vectors.
+    """
     out = np.empty((len(latitude), len(azimuth), 3))
     out[..., :2] = np.cos(latitude)[:, None, None] * azimuth
     out[..., 2] = np.sin(latitude)[:, None]
@@ -104,10 +186,27 @@ def directions(azimuth: NDArray, latitude: NDArray) -> NDArray[np.float64]:
 def sample_directions(
     height: int, width: int, finer: int, turn: float = 0.0
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Directions of a grid `finer` times as fine as a map of height x width, turned by `turn`.
+    """Give the directions of a grid that is finer than a map.
 
-    -> azimuth unit vectors (W * finer, 2), latitudes (H * finer,), solid angle of one sample of
-    each row (H * finer,). Separate, because a map is a product of the two.
+    Azimuths and latitudes are separate because the grid is the product of the two.
+
+    Parameters
+    ----------
+    height, width : int
+        The size of the map in texels.
+    finer : int
+        Samples along the side of a texel.
+    turn : float
+        The map's turn in radians, see `Environment`.
+
+    Returns
+    -------
+    azimuth : (W * finer, 2) float64
+        Unit vectors.
+    latitude : (H * finer,) float64
+        Radians.
+    weight : (H * finer,) float64
+        The solid angle of one sample of each row, in steradians.
     """
     rows, columns = height * finer, width * finer
     edges = np.linspace(np.pi / 2, -np.pi / 2, rows + 1)

@@ -1,11 +1,21 @@
 """Lamps of an environment: suns, windows and softboxes, cut out of the map around them.
 
-One patch holds a whole sun, and no filter on a patch shows its shadows. What outshines the rest of
-the map by far is therefore split off, so that its light can be brought to the picture by other
-means (a render of just that light), while the rest stays light that patches resolve well.
+A single patch holds a whole sun, and no filter on a patch resolves the sun's shadows. So light
+that outshines the rest of the map by far is split off, and comes into the picture by a render of
+that light alone. The rest stays light that patches resolve well.
 
-The cut is on radiance: a texel keeps what it has up to a level, and the lamps take what is above
-it. The two maps add up to the whole, texel by texel, so no energy is lost or made.
+The cut is on radiance: a texel keeps its radiance up to a level, and the lamps take what is above
+the level. The two maps add up to the whole texel by texel, so no energy is lost or made.
+
+Examples
+--------
+>>> image = np.ones((32, 64, 3), np.float32)
+>>> image[8, 8] = 5000.0
+>>> found = split(Environment(image))
+>>> bool(found.lamps.image[8, 8, 0] > 4900), found.worth
+(True, True)
+>>> bool(np.allclose(found.rest.image + found.lamps.image, image))
+True
 """
 
 from __future__ import annotations
@@ -27,7 +37,15 @@ _STEPS = 60
 
 @dataclass(frozen=True)
 class Split:
-    """rest + lamps is the environment; share: of all light, how much the lamps have, 0 to 1."""
+    """An environment cut in two.
+
+    Parameters
+    ----------
+    rest, lamps : Environment
+        They sum to the environment.
+    share : float
+        The share of the lamps in all light, 0 to 1.
+    """
 
     rest: Environment
     lamps: Environment
@@ -35,7 +53,7 @@ class Split:
 
     @property
     def worth(self) -> bool:
-        """Whether the lamps have enough light to be treated by themselves."""
+        """Whether the lamps have enough light for a render of their own."""
         return self.share >= WORTH
 
 
@@ -44,13 +62,21 @@ def split(
 ) -> Split:
     """Cut the lamps out of an environment map.
 
-    hemicube: where given, light from directions without a patch is no light: it is neither lamp nor
-    counted.
+    The level of the cut is `contrast` times the mean radiance of what stays below it. Cutting again
+    and again, from the top, finds that level. What covers more than 1 / contrast of the sphere is
+    never a lamp, however bright. Turning the map or changing its exposure changes nothing else.
 
-    The level of the cut is `contrast` times the mean radiance of what stays: the level for which
-    that is true is found by cutting again, from the top, until nothing changes. What covers more
-    than 1/contrast of the sphere is no lamp, however bright. Turning the map or changing its
-    exposure changes nothing else.
+    Parameters
+    ----------
+    environment : Environment
+    hemicube : Hemicube, optional
+        Light from directions in which it has no patch is left out of lamps and sums.
+    contrast : float
+        How many times brighter than the rest a lamp is.
+
+    Returns
+    -------
+    Split
     """
     image = environment.image
     radiance = np.maximum(image.sum(axis=-1, dtype=np.float64), 0)

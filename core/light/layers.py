@@ -1,9 +1,16 @@
-"""Layers: a relit picture taken apart by where its light comes from, so that each part of the light
-can be dimmed or tinted afterwards without relighting.
+"""Layers: a relit picture taken apart by where its light comes from.
 
-Light adds up: an environment is cut into parts that sum to it, texel by texel, and a picture under
-each part is a layer. The layers of a picture without noise sum to it. Denoised ones nearly do, and
-what they are off by is shared out among them.
+Each part of the light can then be dimmed or tinted without relighting. Light adds up: an
+environment is cut into parts that sum to it texel by texel, and the picture under each part is a
+layer. Layers without noise sum to the picture. Denoised layers nearly do, and their difference
+from the picture is shared out among them.
+
+Examples
+--------
+>>> key, fill = np.full((1, 1, 3), 0.6), np.full((1, 1, 3), 0.2)
+>>> whole = np.full((1, 1, 3), 1.0)
+>>> [round(float(part.mean()), 3) for part in share_out([key, fill], whole)]
+[0.75, 0.25]
 """
 
 from __future__ import annotations
@@ -28,7 +35,18 @@ def _looked_up(environment: Environment) -> NDArray[np.float64]:
 
 
 def by_faces(environment: Environment, hemicube: Hemicube) -> dict[str, NDArray[np.float32]]:
-    """What of each texel (H, W) is a face's light, for each face of a hemicube."""
+    """Cut an environment by the faces of a hemicube.
+
+    Parameters
+    ----------
+    environment : Environment
+    hemicube : Hemicube
+
+    Returns
+    -------
+    dict of str to (H, W) float32
+        For each face its share of each texel, 0 or 1.
+    """
     patch = hemicube.locate(_looked_up(environment))[0]
     faces = np.array([hemicube.faces.index(face) for face, *_ in hemicube.grid])
     face = np.where(patch >= 0, faces[patch], -1)
@@ -38,10 +56,22 @@ def by_faces(environment: Environment, hemicube: Hemicube) -> dict[str, NDArray[
 def disc(
     environment: Environment, azimuth: float, elevation: float, radius: float, soft: float = 0.1
 ) -> NDArray[np.float32]:
-    """A round part of an environment, (H, W): 1 inside, 0 outside.
+    """Make a round part of an environment.
 
-    azimuth, elevation: of its middle, in radians, counterclockwise from +X and up from the horizon;
-    radius: in radians; soft: the share of the radius over which its rim fades.
+    Parameters
+    ----------
+    environment : Environment
+    azimuth, elevation : float
+        Its middle in radians, counterclockwise from +X and up from the horizon.
+    radius : float
+        Radians.
+    soft : float
+        The share of the radius over which the rim fades.
+
+    Returns
+    -------
+    (H, W) float32
+        1 inside, 0 outside.
     """
     across = np.cos(elevation)
     middle = (across * np.cos(azimuth), across * np.sin(azimuth), np.sin(elevation))
@@ -51,8 +81,20 @@ def disc(
 
 
 def shares(masks: Mapping[str, NDArray]) -> dict[str, NDArray[np.float32]]:
-    """Parts of an environment from masks (H, W) in [0, 1], which may overlap: each takes what those
-    before it left, and `REST` what is left of all. They sum to 1."""
+    """Turn masks into parts of an environment that sum to 1.
+
+    Masks may overlap: each takes its share of what the earlier ones left.
+
+    Parameters
+    ----------
+    masks : dict of str to (H, W) float
+        Between 0 and 1, by name.
+
+    Returns
+    -------
+    dict of str to (H, W) float32
+        The parts by name; `REST` is what all masks leave.
+    """
     out: dict[str, NDArray[np.float32]] = {}
     left: NDArray | float = 1.0
     for name, mask in masks.items():
@@ -63,15 +105,37 @@ def shares(masks: Mapping[str, NDArray]) -> dict[str, NDArray[np.float32]]:
 
 
 def part_of(environment: Environment, share: NDArray) -> Environment:
-    """An environment with a share (H, W) of each texel's light."""
+    """Take a share of each texel of an environment.
+
+    Parameters
+    ----------
+    environment : Environment
+    share : (H, W) float
+        0 to 1.
+
+    Returns
+    -------
+    Environment
+    """
     return Environment((environment.image * share[..., None]).astype(np.float32), environment.turn)
 
 
 def share_out(layers: Sequence[NDArray], whole: NDArray) -> list[NDArray[np.float32]]:
-    """Layers (H, W, 3) that sum to `whole`, none below 0, each as near to what it was as it may be.
+    """Change layers so that they sum to a picture and none is below 0.
 
-    What they are off by is shared in proportion, channel by channel; light that no layer has is
-    given to all alike.
+    The difference is shared in proportion to the layers, channel by channel. Light that no layer
+    has is given to all in equal parts.
+
+    Parameters
+    ----------
+    layers : sequence of (H, W, 3) float
+        Scene-linear.
+    whole : (H, W, 3) float
+        The picture.
+
+    Returns
+    -------
+    list of (H, W, 3) float32
     """
     parts = [np.maximum(layer, 0).astype(np.float64) for layer in layers]
     total = np.sum(parts, axis=0)
@@ -82,6 +146,18 @@ def share_out(layers: Sequence[NDArray], whole: NDArray) -> list[NDArray[np.floa
 
 
 def residual(layers: Sequence[NDArray], whole: NDArray) -> float:
-    """The largest that a sum of layers differs from the picture, of its largest light."""
+    """Compute the largest difference between the sum of layers and their picture.
+
+    Parameters
+    ----------
+    layers : sequence of (H, W, 3) float
+    whole : (H, W, 3) float
+        The picture.
+
+    Returns
+    -------
+    float
+        Relative to the largest value of the picture.
+    """
     off = np.abs(np.sum([layer.astype(np.float64) for layer in layers], axis=0) - whole)
     return float(off.max(initial=0) / max(float(np.max(whole, initial=0)), 1e-12))

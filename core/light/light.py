@@ -1,8 +1,16 @@
 """Light on the patches: an environment map made ready for evaluating supports (paper 6).
 
-Every patch gets a small grid of bins, equal in angle, that collects the map's flux and the solid
-angle it came from. Summed-area tables of both (float64: a sun beside darkness cancels) then give
-the average radiance over any box of a patch, weighted by solid angle, from four corners.
+Every patch gets a grid of bins, equal in angle, that collects the map's flux and the solid angle
+of that flux. Summed-area tables of both give the average radiance over any box of a patch,
+weighted by solid angle, from four corners. The tables are float64, because sums of a sun beside
+darkness cancel.
+
+Examples
+--------
+>>> light = PatchLight(Environment.uniform(2.0), Hemicube(patches=2))
+>>> u0, u1 = np.array([0.2]), np.array([0.5])
+>>> light.box(0, u0, u1, u0, u1).round(6).tolist()
+[[2.0, 2.0, 2.0]]
 """
 
 from __future__ import annotations
@@ -29,8 +37,13 @@ from .environment import Environment
 class PatchLight:
     """An environment map as the patches of a hemicube see it.
 
-    resolution: bins a patch side, the same for all (default: about one texel of the map each).
-    Directions without a patch (a hemicube without a bottom, say) give no light.
+    Parameters
+    ----------
+    environment : Environment
+    hemicube : Hemicube
+        Light from directions in which it has no patch is left out.
+    resolution : int, optional
+        Bins a side, the same for all patches. By default a bin is about one texel of the map.
     """
 
     def __init__(
@@ -41,11 +54,11 @@ class PatchLight:
             self.resolutions = default_resolution(hemicube, environment)
         else:
             self.resolutions = np.full(len(hemicube), resolution, np.intp)
-        # where each patch's bins begin, and its table of sums, which has a row and column more
+        # where the bins of each patch begin, and where its table of sums, one row and column larger
         self._offsets = _starts(self.resolutions**2)
         self._tables = _starts((self.resolutions + 1) ** 2)
         height, width = environment.image.shape[:2]
-        # flux and solid angle side by side: one look-up fetches all four
+        # flux and solid angle stand side by side, so that one look-up fetches all four
         self._flat = np.zeros((int(self._offsets[-1]), 4))
         for some in sample_bins(hemicube, height, width, self.resolutions, self._offsets):
             self._collect(environment.image[some.rows], some, environment.turn)
@@ -56,7 +69,7 @@ class PatchLight:
 
     @property
     def _sat(self) -> NDArray[np.float64]:
-        """The tables of sums, of which only boxes ask; worked out for the first one."""
+        """The tables of sums. Only boxes need them, so the first box makes them."""
         with self._lock:  # threads that relight come here at once
             if self._sums is None:
                 sums = np.zeros((int(self._tables[-1]), 4))
@@ -90,25 +103,39 @@ class PatchLight:
 
     @property
     def resolution(self) -> int:
-        """Bins a patch side, where all patches have the same (ValueError where not)."""
+        """Bins a side of a patch, where all patches have the same; ValueError where they differ."""
         if (self.resolutions != self.resolutions[0]).any():
             raise ValueError("the patches differ in size, and so in bins: see `resolutions`")
         return int(self.resolutions[0])
 
     def bins_of(self, k: int) -> NDArray[np.float64]:
-        """(r, r, 4): flux (3) and solid angle of the bins of patch k, row by row of v."""
+        """Give the bins of a patch.
+
+        Parameters
+        ----------
+        k : int
+            The number of the patch.
+
+        Returns
+        -------
+        (r, r, 4) float64
+            Flux of red, green and blue, and solid angle, row by row of v.
+        """
         r = self.resolutions[k]
         return self._flat[self._offsets[k] : self._offsets[k + 1]].reshape(r, r, 4)
 
     @property
     def binned(self) -> NDArray[np.float64]:
-        """(K, r, r, 4): `bins_of` all patches, where all have as many."""
+        """(K, r, r, 4) float64: the bins of all patches, where all have the same number."""
         r = self.resolution
         return self._flat.reshape(-1, r, r, 4)
 
     def _fill_empty(self, environment: Environment) -> None:
-        """A bin that no sample met takes the texel behind its middle, with next to no weight, so
-        that a thin box that sees it alone finds light there."""
+        """Give a bin without samples the radiance of the texel behind its middle, with a tiny
+        weight.
+
+        A thin box that sees nothing but this bin then finds light there.
+        """
         empty = np.flatnonzero(self._flat[:, 3] == 0)
         for k in np.unique(np.searchsorted(self._offsets, empty, side="right") - 1):
             bins = self.bins_of(int(k))
@@ -121,19 +148,40 @@ class PatchLight:
 
     @cached_property
     def whole(self) -> NDArray[np.float64]:
-        """(K, 3): average radiance of each patch."""
+        """(K, 3) float64: the average radiance of each patch."""
         total = np.add.reduceat(self._flat, self._offsets[:-1])
         return total[:, :3] / total[:, 3:]
 
     def bin_centres(self, k: int) -> tuple[NDArray, NDArray]:
-        """Patch coordinates of the bins' centres along u and along v -> (r,), (r,)."""
+        """Compute the centres of a patch's bins.
+
+        Parameters
+        ----------
+        k : int
+            The number of the patch.
+
+        Returns
+        -------
+        u, v : (r,) float64
+            Patch coordinates along u and along v.
+        """
         return bin_centres(self.hemicube, k, int(self.resolutions[k]))
 
     def polynomial(self, which: tuple[int, ...]) -> NDArray[np.float64]:
-        """The polynomial in u, v nearest to each patch's light, by solid angle.
+        """Fit a polynomial in u, v to the light of each patch, by least squares over solid angle.
 
-        which: indices into `patterns.MONOMIALS` -> coefficients (K, len(which), 3). Light that is
-        such a polynomial is met exactly, and so then is the pixel: it is a sum of moments.
+        Light that is such a polynomial is reproduced exactly. The pixel is then exact too, because
+        it is a sum of moments.
+
+        Parameters
+        ----------
+        which : tuple of int
+            The monomials, as indices into `patterns.MONOMIALS`.
+
+        Returns
+        -------
+        (K, len(which), 3) float64
+            The coefficients.
         """
         with self._lock:  # threads that relight come here at once
             if which in self._polynomials:
@@ -156,10 +204,25 @@ class PatchLight:
     def box(
         self, k: int | NDArray, u0: NDArray, u1: NDArray, v0: NDArray, v1: NDArray
     ) -> NDArray[np.float64]:
-        """Average radiance over boxes of patch k, weighted by solid angle -> (n, 3).
+        """Average the radiance over boxes of a patch, weighted by solid angle.
 
-        u0..v1: (n,) edges in patch coordinates, inside [0, 1]. A box thinner than a bin is widened
-        to one: the map holds no finer light.
+        A box thinner than a bin is widened to one bin, because the bins hold no finer light.
+
+        Parameters
+        ----------
+        k : int or (n,) int
+            The numbers of the patches.
+        u0, u1, v0, v1 : (n,) float
+            Edges in patch coordinates, 0 to 1.
+
+        Returns
+        -------
+        (n, 3) float64
+            Scene-linear radiance.
+
+        Source
+        ------
+        Paper 6.
         """
         r = self.resolutions[k]
         i0, i1 = _at_least_one_bin(
@@ -179,7 +242,9 @@ class PatchLight:
         return total[:, :3] / total[:, 3:]
 
     def _sum_to(self, k: int | NDArray, i: NDArray, j: NDArray) -> NDArray[np.float64]:
-        """The table between its entries: bilinear, which is exact for light constant in a bin."""
+        """Look up the table between its entries: bilinear, which is exact for light constant in a
+        bin.
+        """
         r = self.resolutions[k]
         table = self._sat
         a = np.minimum(i.astype(np.int64), r - 1)
@@ -198,8 +263,10 @@ class PatchLight:
 
 
 def _turned(samples: NDArray, turn: float) -> NDArray:
-    """What cells of a map (rows, columns) see of it once it is turned: its mean over each. So the
-    cells stay where they are, and their bins need not be looked for again."""
+    """What the cells of a map (rows, columns) see of the turned map: its mean over each cell.
+
+    The cells keep their bins, so that those need not be computed again.
+    """
     shift = turn / (2 * np.pi) * samples.shape[1]
     whole = int(np.floor(shift))
     part = shift - whole
@@ -211,7 +278,7 @@ def _turned(samples: NDArray, turn: float) -> NDArray:
 
 
 def _starts(sizes: NDArray) -> NDArray[np.intp]:
-    """Where each of some runs of these lengths begins, and where the last one ends (K + 1,)."""
+    """Where each of some runs begins, and where the last one ends, (K + 1,)."""
     return np.concatenate([[0], np.cumsum(sizes)]).astype(np.intp)
 
 

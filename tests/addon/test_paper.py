@@ -8,7 +8,7 @@ from arto.arto_addon.fit import fit
 from arto.arto_addon.relight import relight
 from arto.core import exr
 from arto.core.errors import PatternError
-from arto.core.hemicube import FACES
+from arto.core.faces import FACES
 from scene_tools import assert_as_cycles, captured, set_colour, small_scene
 
 

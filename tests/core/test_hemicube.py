@@ -8,7 +8,8 @@ import math
 import numpy as np
 import pytest
 from arto.core.errors import HemicubeError
-from arto.core.hemicube import FACE_NAMES, FACES, PRESETS, SIDES, Hemicube
+from arto.core.faces import FACE_NAMES, FACES, PRESETS, SIDES
+from arto.core.hemicube import Hemicube
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from arto.core.hemicube import FACE_NAMES, Hemicube
+from arto.core.faces import FACE_NAMES
+from arto.core.hemicube import Hemicube
 from arto.core.light.bins import bin_coordinate
 from arto.core.light.environment import Environment
 from arto.core.light.light import PatchLight

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from arto.core.capture.refine import refine
 from arto.core.errors import HemicubeError
-from arto.core.hemicube import FACE_NAMES, FINEST, Hemicube
+from arto.core.faces import FACE_NAMES, FINEST
+from arto.core.hemicube import Hemicube
 
 CUBE = Hemicube(patches=4)
 SHAPE = (6, 8)
