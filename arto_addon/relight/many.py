@@ -14,13 +14,14 @@ import bpy
 from ...core.errors import CaptureSetError, SceneError
 from ...core.relight import together
 from ...core.shot import Shot, safe_name
-from ..blender.nodes import new_world, shader_tree
+from ..blender.nodes import new_world
 from ..capture.sequence import frame_kept
 from ..plate.present import present_frames
 from ..shot import paths
 from ..shot.shot import check_same_shot, shot_of
 from ..work import Progress, Render, Steps, retold
 from ..world.check import check_world
+from ..world.dials import turned
 from .relight import finish, make_ready
 from .shown import Light, Ready, Shown
 
@@ -101,7 +102,7 @@ def _lent(
 
     turn: of the whole circle.
     """
-    world = lent.enter_context(_world_of(file)) if file else None
+    world = lent.enter_context(_world_showing(file)) if file else None
     if turn:
         world = lent.enter_context(turned(world or check_world(scene, view_layer), turn * math.tau))
     return world
@@ -154,7 +155,7 @@ def _shown(scene: bpy.types.Scene, view_layer: str, still: Shown | None) -> Show
 
 
 @contextmanager
-def _world_of(file: Path) -> Iterator[Any]:
+def _world_showing(file: Path) -> Iterator[Any]:
     """A world that shows an environment map from a file. Raises SceneError."""
     if not file.is_file():
         raise SceneError(f"there is no environment map {file}")
@@ -174,36 +175,3 @@ def _world_of(file: Path) -> Iterator[Any]:
         yield world
     finally:
         bpy.data.batch_remove(made)
-
-
-@contextmanager
-def turned(world: bpy.types.World, angle: float) -> Iterator[Any]:
-    """A copy of a world, turned about the vertical by so many radians, as its Mapping node would.
-
-    Raises SceneError for one that is not turned by one node.
-    """
-    copy = world.copy()
-    try:
-        for block in (copy, copy.node_tree):
-            if block:
-                block.animation_data_clear()
-        tree = shader_tree(copy)
-        nodes = tree.nodes if tree else ()
-        textures = [n for n in nodes if n.bl_idname == "ShaderNodeTexEnvironment"]
-        mappings = [n for n in nodes if n.bl_idname == "ShaderNodeMapping"]
-        if len(textures) == 1 and not mappings and not textures[0].inputs["Vector"].is_linked:
-            mapping = nodes.new("ShaderNodeMapping")
-            source = nodes.new("ShaderNodeTexCoord")
-            tree.links.new(source.outputs["Generated"], mapping.inputs["Vector"])
-            tree.links.new(mapping.outputs[0], textures[0].inputs["Vector"])
-        elif len(mappings) == 1 and not mappings[0].inputs["Rotation"].is_linked:
-            mapping = mappings[0]
-        else:
-            raise SceneError(
-                f"the world '{world.name}' is not turned by one Mapping node before its texture: "
-                "add one, or give maps by --worlds"
-            )
-        mapping.inputs["Rotation"].default_value[2] += angle
-        yield copy
-    finally:
-        bpy.data.worlds.remove(copy)

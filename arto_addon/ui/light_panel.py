@@ -15,7 +15,7 @@ from ..plate.plate import name_of
 from ..plate.present import MIX
 from ..relight.layers import prefix_of
 from ..shot import paths, status
-from ..world import controls
+from ..world import controls, dials
 from ..world.check import world_of
 from . import thumbnails
 from .places import Draws, say
@@ -52,13 +52,13 @@ def _world(column: bpy.types.UILayout, context: bpy.types.Context, world: bpy.ty
         column.template_ID(nodes[0], "image", open="image.open")
     else:
         column.operator("arto.open_hdri", icon="FILE_FOLDER")
-    dials = column.column(align=True)
-    turned = dials.row()
-    why = controls.why_not_turned(world)
+    sliders = column.column(align=True)
+    turned = sliders.row()
+    why = dials.why_not_turned(world)
     turned.enabled = not why
     turned.prop(world.arto, "rotation", slider=True)
-    rest = dials.column(align=True)
-    rest.enabled = not world.library and bool(controls.backgrounds(world))
+    rest = sliders.column(align=True)
+    rest.enabled = not world.library and bool(dials.backgrounds(world))
     rest.prop(world.arto, "strength")
     rest.prop(world.arto, "tint")
     if why:

@@ -1,46 +1,175 @@
-"""The dials of a world, its strength and its turn about the vertical, apart from what it shows.
+"""The dials of a world: which node turns all of it, and which socket scales its strength.
 
-Where one background node and one mapping node stand for all of it, a map need be made only once for
-every strength and turn.
+Sliders, turntables, and the maps of worlds that are kept all ask here. Where one background node
+and one mapping node stand for all of a world, a map need be made only once for every strength and
+turn. Where others do, a slider moves them, and where there are none, they are put in.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import bpy
 
-from ..blender.nodes import shader_tree
+from ...core.errors import SceneError
+from ..blender.nodes import shader_tree, trees
 from .detail import values_only
 
-
-@contextmanager
-def without_dials(world: bpy.types.World) -> Iterator[tuple[Any, float, float]]:
-    """A copy of the world as it is now without its strength and turn, and those two."""
-    plain = world.copy()
-    try:
-        for block in (plain, plain.node_tree):
-            if block:
-                block.animation_data_clear()
-        background, mapping = dials(plain)
-        strength, turn = 1.0, 0.0
-        if background:
-            strength = background.inputs["Strength"].default_value
-            background.inputs["Strength"].default_value = 1.0
-        if mapping:
-            turn = mapping.inputs["Rotation"].default_value[2] % (2 * math.pi)
-            mapping.inputs["Rotation"].default_value[2] = 0.0
-        yield plain, strength, turn
-    finally:
-        bpy.data.worlds.remove(plain)
+# The nodes that are put in.
+TURN, STRENGTH, PLACE = "ARTO Turn", "ARTO Strength", "ARTO Place"
+# What has its picture by direction.
+_PICTURES = {"ShaderNodeTexEnvironment", "ShaderNodeTexSky"}
+# What a mapping node can be put behind.
+_SOURCES = {"ShaderNodeTexCoord", "ShaderNodeMapping", "ShaderNodeNewGeometry"}
 
 
-def dials(world: bpy.types.World) -> tuple[Any, Any]:
-    """The background node whose strength is that of all the world, and the mapping node that turns
-    it; None where there is no such one."""
+def backgrounds(world: bpy.types.World) -> list[Any]:
+    """The background nodes of a world's own tree."""
+    tree = shader_tree(world)
+    return [n for n in tree.nodes if n.bl_idname == "ShaderNodeBackground"] if tree else []
+
+
+def _pictures(world: bpy.types.World) -> list[Any]:
+    """The nodes of a world's own tree that show a picture by its socket Vector."""
+    tree = shader_tree(world)
+    found = [n for n in tree.nodes if n.bl_idname in _PICTURES] if tree else []
+    return [n for n in found if "Vector" in n.inputs and not n.inputs["Vector"].is_unavailable]
+
+
+def _groups(world: bpy.types.World) -> list[Any]:
+    """The group nodes of a world's own tree in which a picture is."""
+    tree = shader_tree(world)
+    return [
+        node
+        for node in (tree.nodes if tree else ())
+        if node.bl_idname == "ShaderNodeGroup"
+        and any(n.bl_idname in _PICTURES for t in trees(node.node_tree, set()) for n in t.nodes)
+    ]
+
+
+def _mappings_before(sockets: Iterable[Any]) -> list[Any]:
+    """The first mapping nodes on the ways that lead to sockets, each once."""
+    found: list[Any] = []
+    seen: list[Any] = []
+    todo = list(sockets)
+    while todo:
+        for link in todo.pop().links:
+            node = link.from_node
+            if node in seen:
+                continue
+            seen.append(node)
+            if node.bl_idname == "ShaderNodeMapping":
+                found.append(node)
+            else:
+                todo += node.inputs
+    return found
+
+
+def turner(world: bpy.types.World) -> Any:
+    """The mapping node that turns all pictures of a world; None where there is none, or where
+    several do, or where its rotation is worked out by other nodes."""
+    ways = [[picture.inputs["Vector"]] for picture in _pictures(world)]
+    ways = ways or [list(group.inputs) for group in _groups(world)]
+    found = [_mappings_before(sockets) for sockets in ways]
+    if not found or len(found[0]) != 1 or any(some != found[0] for some in found):
+        return None
+    (node,) = found[0]
+    return None if node.inputs["Rotation"].is_linked else node
+
+
+def why_not_turned(world: bpy.types.World) -> str:
+    """Why a world cannot be turned, for a grey slider; empty where it can."""
+    if world.library:
+        return "The world is linked from a library: make it local to change it"
+    if turner(world) is not None:
+        return ""
+    pictures = _pictures(world)
+    if not pictures:
+        if _groups(world):
+            return "The HDRI is in a node group: turn it there"
+        return "The world has no HDRI or sky: it is the same from every side"
+    sources = {_source(picture) for picture in pictures}
+    if any(kind not in _SOURCES for kind, _, _ in sources):
+        return "The HDRI is turned by nodes of its own: turn it there"
+    if len(sources) > 1:
+        return "The world's HDRIs are turned one by one: turn them there"
+    return ""
+
+
+def _source(picture: Any) -> tuple[str, str, str]:
+    """What a picture's direction comes from: kind of node, its name where it is a mapping node (of
+    the others, one is as good as another), and the socket."""
+    links = picture.inputs["Vector"].links
+    if not links:
+        return "ShaderNodeTexCoord", "", "Generated"
+    node = links[0].from_node
+    name = node.name if node.bl_idname == "ShaderNodeMapping" else ""
+    return node.bl_idname, name, links[0].from_socket.name
+
+
+def put_in_turner(world: bpy.types.World) -> Any:
+    """A new mapping node that turns all pictures of a world, which `why_not_turned` lets be."""
+    tree, pictures = world.node_tree, _pictures(world)
+    node = tree.nodes.new("ShaderNodeMapping")
+    node.name = node.label = TURN
+    first = pictures[0]
+    node.location = (first.location.x - 220, first.location.y)
+    links = first.inputs["Vector"].links
+    if links:
+        source = links[0].from_socket
+    else:
+        place = tree.nodes.new("ShaderNodeTexCoord")
+        place.name = place.label = PLACE
+        place.location = (node.location.x - 220, node.location.y)
+        source = place.outputs["Generated"]
+    tree.links.new(source, node.inputs["Vector"])
+    for picture in pictures:
+        tree.links.new(node.outputs[0], picture.inputs["Vector"])
+    return node
+
+
+def scaler(world: bpy.types.World) -> Any:
+    """The socket that says how bright all of a world is; None where there is no such one."""
+    tree = shader_tree(world)
+    if tree is None:
+        return None
+    if STRENGTH in tree.nodes:
+        return tree.nodes[STRENGTH].outputs[0]
+    background, _ = whole(world)
+    found = [background] if background else backgrounds(world)
+    if len(found) == 1 and not found[0].inputs["Strength"].is_linked:
+        return found[0].inputs["Strength"]
+    return None
+
+
+def put_in_scaler(world: bpy.types.World) -> Any:
+    """A new socket that all backgrounds of a world are multiplied by, with 1 in it."""
+    tree = world.node_tree
+    dial = tree.nodes.new("ShaderNodeValue")
+    dial.name = dial.label = STRENGTH
+    dial.outputs[0].default_value = 1.0
+    for background in backgrounds(world):
+        into = background.inputs["Strength"]
+        times = tree.nodes.new("ShaderNodeMath")
+        times.operation, times.label = "MULTIPLY", STRENGTH
+        times.location = (background.location.x - 180, background.location.y - 160)
+        dial.location = (times.location.x - 180, times.location.y - 60)
+        if into.is_linked:
+            tree.links.new(into.links[0].from_socket, times.inputs[0])
+        else:
+            times.inputs[0].default_value = into.default_value
+        tree.links.new(dial.outputs[0], times.inputs[1])
+        tree.links.new(times.outputs[0], into)
+    return dial.outputs[0]
+
+
+def whole(world: bpy.types.World) -> tuple[Any, Any]:
+    """The background node whose strength is that of all the world's light, and the mapping node of
+    which every picture of it hangs, so that a turn of the node is a turn of the light; None where
+    there is no such one."""
     tree = shader_tree(world)
     out = tree.get_output_node("CYCLES") if tree else None
     links = out.inputs["Surface"].links if out else ()
@@ -80,8 +209,8 @@ def dials(world: bpy.types.World) -> tuple[Any, Any]:
 
 
 def read(world: bpy.types.World) -> tuple[float, float, list[Any]]:
-    """A world's strength and turn as they are now, and the sockets that say so."""
-    background, mapping = dials(world)
+    """The strength and turn that stand for all of a world, and the sockets that say so."""
+    background, mapping = whole(world)
     sockets = []
     strength, turn = 1.0, 0.0
     if background:
@@ -91,3 +220,46 @@ def read(world: bpy.types.World) -> tuple[float, float, list[Any]]:
         sockets.append(mapping.inputs["Rotation"])
         turn = sockets[-1].default_value[2] % (2 * math.pi)
     return strength, turn, sockets
+
+
+@contextmanager
+def _still_copy(world: bpy.types.World) -> Iterator[bpy.types.World]:
+    """A copy of a world as it is now, without its animation."""
+    copy = world.copy()
+    try:
+        for block in (copy, copy.node_tree):
+            if block:
+                block.animation_data_clear()
+        yield copy
+    finally:
+        bpy.data.worlds.remove(copy)
+
+
+@contextmanager
+def without_dials(world: bpy.types.World) -> Iterator[tuple[bpy.types.World, float, float]]:
+    """A copy of the world as it is now without its strength and turn, and those two."""
+    with _still_copy(world) as plain:
+        strength, turn, _ = read(plain)
+        background, mapping = whole(plain)
+        if background:
+            background.inputs["Strength"].default_value = 1.0
+        if mapping:
+            mapping.inputs["Rotation"].default_value[2] = 0.0
+        yield plain, strength, turn
+
+
+@contextmanager
+def turned(world: bpy.types.World, angle: float) -> Iterator[bpy.types.World]:
+    """A copy of a world, turned about the vertical by so many radians, as its slider would.
+
+    Raises SceneError for one that cannot be turned.
+    """
+    with _still_copy(world) as copy:
+        if why := why_not_turned(copy):
+            raise SceneError(
+                f"the world '{world.name}' cannot be turned ({why[0].lower()}{why[1:]}): add one "
+                "Mapping node before its texture, or give maps by --worlds"
+            )
+        node = turner(copy) or put_in_turner(copy)
+        node.inputs["Rotation"].default_value[2] += angle
+        yield copy

@@ -7,8 +7,9 @@ import math
 import bpy
 import numpy as np
 import pytest
-from arto.arto_addon.world import controls, kept
+from arto.arto_addon.world import dials, kept
 from arto.arto_addon.world.bake import bake
+from arto.core.errors import SceneError
 from scene_tools import small_scene
 
 WIDTH = 64
@@ -51,7 +52,7 @@ def test_turn_of_a_world_without_a_mapping_node(scene) -> None:
     before = _baked(scene)
     world.arto.rotation = math.pi / 2
     assert world.arto.rotation == pytest.approx(math.pi / 2)
-    assert [n.name for n in world.node_tree.nodes].count(controls.TURN) == 1
+    assert [n.name for n in world.node_tree.nodes].count(dials.TURN) == 1
     turned = _baked(scene)
     # a mapping node turns the direction that is looked up: what stood at +Y stands at +X
     expected = np.roll(before, WIDTH // 4, axis=1)
@@ -125,18 +126,18 @@ def test_looking_puts_nothing_in(scene) -> None:
     names = [n.name for n in world.node_tree.nodes]
     assert (world.arto.rotation, world.arto.strength) == (0.0, 1.0)
     assert tuple(world.arto.tint) == (1.0, 1.0, 1.0)
-    controls.why_not_turned(world)
+    dials.why_not_turned(world)
     assert [n.name for n in world.node_tree.nodes] == names
 
 
 def test_why_a_slider_is_grey(scene) -> None:
     world = scene.world
-    assert "no HDRI" in controls.why_not_turned(world)
+    assert "no HDRI" in dials.why_not_turned(world)
     texture = _texture(world)
-    assert controls.why_not_turned(world) == ""
+    assert dials.why_not_turned(world) == ""
     wave = world.node_tree.nodes.new("ShaderNodeTexWave")
     world.node_tree.links.new(wave.outputs[0], texture.inputs["Vector"])
-    assert "nodes of its own" in controls.why_not_turned(world)
+    assert "nodes of its own" in dials.why_not_turned(world)
 
 
 def test_dials_are_told_apart_from_what_is_shown(scene) -> None:
@@ -153,3 +154,59 @@ def test_dials_are_told_apart_from_what_is_shown(scene) -> None:
     assert tinted != key
     texture.image = _spot(0.0)
     assert kept.shows(scene, world)[0] not in {key, tinted}
+
+
+def test_a_background_that_is_seen_is_the_one_that_is_dimmed(scene) -> None:
+    """One that leads nowhere makes no difference, and no node is put in."""
+    world = scene.world
+    _texture(world)
+    spare = world.node_tree.nodes.new("ShaderNodeBackground")
+    before, count = _baked(scene), len(world.node_tree.nodes)
+    world.arto.strength = 2.0
+    assert len(world.node_tree.nodes) == count
+    assert spare.inputs["Strength"].default_value == 1.0
+    np.testing.assert_allclose(_baked(scene), 2 * before, rtol=1e-3, atol=1e-4)
+    assert kept.shows(scene, world)[1] == pytest.approx(2.0)
+
+
+def test_a_mapping_node_before_a_group_turns_what_is_in_it(scene) -> None:
+    """The slider and a turntable turn the world by the same node."""
+    world = scene.world
+    tree = world.node_tree
+    inner = bpy.data.node_groups.new("Dome", "ShaderNodeTree")
+    inner.interface.new_socket("Vector", in_out="INPUT", socket_type="NodeSocketVector")
+    inner.interface.new_socket("Color", in_out="OUTPUT", socket_type="NodeSocketColor")
+    first, last = inner.nodes.new("NodeGroupInput"), inner.nodes.new("NodeGroupOutput")
+    texture = inner.nodes.new("ShaderNodeTexEnvironment")
+    texture.image = _spot(math.pi / 2)
+    inner.links.new(first.outputs[0], texture.inputs["Vector"])
+    inner.links.new(texture.outputs[0], last.inputs[0])
+    group = tree.nodes.new("ShaderNodeGroup")
+    group.node_tree = inner
+    tree.links.new(group.outputs[0], tree.nodes["Background"].inputs["Color"])
+    assert "node group" in dials.why_not_turned(world)
+    with pytest.raises(SceneError, match="node group"), dials.turned(world, 1.0):
+        pass
+    mapping, place = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexCoord")
+    tree.links.new(place.outputs["Generated"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs[0], group.inputs[0])
+    before = _baked(scene)
+    expected = np.roll(before, WIDTH // 4, axis=1)
+    with dials.turned(world, math.pi / 2) as copy:
+        found = bake(scene, WIDTH, None, copy).image
+    np.testing.assert_allclose(found, expected, atol=0.03 * before.max())
+    world.arto.rotation = math.pi / 2
+    np.testing.assert_allclose(_baked(scene), expected, atol=0.03 * before.max())
+
+
+def test_pictures_with_mapping_nodes_of_their_own_keep_them(scene) -> None:
+    world = scene.world
+    tree = world.node_tree
+    for angle in (0.2, 0.5):
+        texture, mapping = _texture(world), tree.nodes.new("ShaderNodeMapping")
+        mapping.inputs["Rotation"].default_value[2] = angle
+        tree.links.new(mapping.outputs[0], texture.inputs["Vector"])
+    count = len(tree.nodes)
+    assert "one by one" in dials.why_not_turned(world)
+    world.arto.rotation = 1.0
+    assert len(tree.nodes) == count
