@@ -32,17 +32,20 @@ from typing import Any, TypeVar
 
 from .errors import ArtoError
 from .region import Region
+from .regular import read_regular
 
 # The largest file that is read. Fingerprints of 100,000 objects take 8 MB.
 MOST_BYTES = 64 << 20
 LARGEST_SIDE = 65536
 MOST_TILES = 100_000
+# Names that Windows keeps for devices, whatever ending they have.
+DEVICES = {"CON", "PRN", "AUX", "NUL"} | {f"{n}{i}" for n in ("COM", "LPT") for i in range(1, 10)}
 _Choice = TypeVar("_Choice", bound=str)
 _NAME = re.compile(r"[\w][\w .~-]{0,120}")
 
 
 class Description:
-    """A JSON object of a file.
+    """A JSON object of a regular file.
 
     Parameters
     ----------
@@ -50,6 +53,8 @@ class Description:
         The file.
     error : callable
         Makes the exception for a text, such as `FieldError`.
+    most : int
+        The largest size in bytes.
 
     Raises
     ------
@@ -57,12 +62,13 @@ class Description:
         What `error` makes: the file cannot be read, is too large, or holds no JSON object.
     """
 
-    def __init__(self, path: Path, error: Callable[[str], ArtoError]) -> None:
+    def __init__(
+        self, path: Path, error: Callable[[str], ArtoError], most: int = MOST_BYTES
+    ) -> None:
         self.path, self.error = path, error
         try:
-            if path.stat().st_size > MOST_BYTES:
-                raise error(f"{path} cannot be read (it has {path.stat().st_size} bytes)")
-            data = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse)
+            text = read_regular(path, most).decode("utf-8")
+            data = json.loads(text, parse_constant=_refuse)
         except (OSError, ValueError, RecursionError) as e:
             raise error(f"{path} cannot be read ({e})") from e
         if not isinstance(data, dict):
@@ -138,7 +144,7 @@ class Description:
             The value is no finite number, or out of bounds.
         """
         value = self.data.get(name, default)
-        if type(value) not in (int, float) or not math.isfinite(value) or not low <= value <= high:
+        if not is_finite(value) or not low <= value <= high:
             raise self.wrong(name, value)
         return float(value)
 
@@ -293,7 +299,7 @@ class Description:
         ArtoError
             The value is no name, or would lead out of the folder.
         """
-        if not isinstance(value, str) or not _NAME.fullmatch(value) or value.endswith((" ", ".")):
+        if not is_plain_name(value):
             raise self.wrong(name, value)
         return value
 
@@ -352,6 +358,39 @@ class Description:
             if any(r[1] < row[3] and row[1] < r[3] for r in open_rows):
                 raise self.wrong("tiles", "two that overlap")
             open_rows.append(row)
+
+
+def is_finite(value: Any) -> bool:
+    """Say whether a value is a finite number that a float can hold.
+
+    Parameters
+    ----------
+    value : object
+
+    Returns
+    -------
+    bool
+    """
+    try:
+        return type(value) in (int, float) and math.isfinite(value)
+    except OverflowError:
+        return False
+
+
+def is_plain_name(value: Any) -> bool:
+    """Say whether a value is the name of a file or folder, which leads nowhere else on any system.
+
+    Parameters
+    ----------
+    value : object
+
+    Returns
+    -------
+    bool
+    """
+    if not isinstance(value, str) or not _NAME.fullmatch(value) or value.endswith((" ", ".")):
+        return False
+    return value.split(".")[0].strip().upper() not in DEVICES
 
 
 def _refuse(constant: str) -> None:

@@ -58,5 +58,9 @@ class CancelledError(ArtoError):
     """The artist stopped the work. Whatever was finished is kept."""
 
 
+class FilesError(ArtoError):
+    """A file or folder that is not ARTO's to change or remove, or that cannot be written."""
+
+
 class FarmError(ArtoError):
     """A farm's job that is incomplete or damaged, or that was made for another scene."""

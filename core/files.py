@@ -1,7 +1,8 @@
 """Writing files and folders whole or not at all, and holding a folder for one process.
 
 What is being written has another name until it is complete. So a reader, a full disk or a process
-that is killed never leads to half a file under the real name.
+that is killed never leads to half a file under the real name. The other name is that of one
+process, and nothing that was there before is opened for writing.
 
 Examples
 --------
@@ -17,25 +18,31 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
+import re
+import stat
 import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import IO
 
-from .errors import BusyError
+from . import marked
+from .errors import BusyError, FilesError
+from .marked import OLD
+from .regular import PART, SAFELY, new_file, unique
 
-PART = ".part"
-OLD = ".old"
+__all__ = ["OLD", "PART", "Lock", "moved", "replace_folder", "settle", "whole", "write_text"]
+
+# Seconds for which Windows may keep a file that somebody reads from being replaced.
+_PATIENCE = 3.0
 
 
 @contextlib.contextmanager
 def whole(path: Path) -> Iterator[Path]:
     """Give a path to write to, and rename it to `path` once the writing has succeeded.
 
-    If the writing fails, the partial file is removed and an older file at `path` stays.
+    If the writing fails, the partial file is removed and an older file at `path` stays. A link at
+    `path` is replaced, and what it leads to stays as it is.
 
     Parameters
     ----------
@@ -45,22 +52,53 @@ def whole(path: Path) -> Iterator[Path]:
     Yields
     ------
     Path
-        The name to write to meanwhile: `path` with `.part` added.
+        The name to write to meanwhile: that of an empty file beside `path`, which no other
+        process has.
 
     Raises
     ------
     OSError
-        The folder cannot be made, or the file cannot be renamed.
+        The folder cannot be made, or the file cannot be made or renamed.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + PART)
+    marked.remove_leftovers(path)
+    partial = path.with_name(unique(path.name))
+    new_file(partial)
     try:
         yield partial
-        partial.replace(path)
+        moved(partial, path)
     except BaseException:
         with contextlib.suppress(OSError):
             partial.unlink(missing_ok=True)
         raise
+
+
+def moved(source: Path, target: Path, patience: float = _PATIENCE) -> None:
+    """Give a file or folder another name; a file of that name is replaced.
+
+    Windows refuses while somebody reads the file, which is over in a moment: there the
+    function tries again.
+
+    Parameters
+    ----------
+    source, target : Path
+    patience : float
+        For how many seconds Windows is asked.
+
+    Raises
+    ------
+    OSError
+        The file cannot be renamed.
+    """
+    until = time.monotonic() + (patience if os.name == "nt" else 0)
+    while True:
+        try:
+            source.replace(target)
+            return
+        except PermissionError:
+            if time.monotonic() >= until:
+                raise
+        time.sleep(0.05)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -84,7 +122,8 @@ def settle(folder: Path) -> None:
     """Bring back the folder that a killed process was about to replace.
 
     `replace_folder` renames twice. Between the two renames no folder has the name `folder`, and the
-    older folder is still there with `.old` added to its name.
+    older folder is still there with `.old` added to its name. A folder of that name that ARTO has
+    not made stays where it is.
 
     Parameters
     ----------
@@ -94,13 +133,15 @@ def settle(folder: Path) -> None:
     Raises
     ------
     OSError
-        A folder cannot be renamed or removed.
+        A folder cannot be renamed.
     """
     old = folder.with_name(folder.name + OLD)
-    if not old.exists():
+    if not marked.is_ours(old):
         return
-    if folder.exists():
-        shutil.rmtree(old)
+    if os.path.lexists(folder):
+        kind = marked.kind_of(old)
+        if kind:
+            marked.remove_quietly(old, kind, old.parent)
     else:
         old.rename(folder)
 
@@ -117,27 +158,33 @@ def replace_folder(complete: Path, folder: Path) -> None:
 
     Raises
     ------
+    FilesError
+        ARTO has not made the older folder. It stays.
     OSError
         A folder cannot be renamed. The older folder then still has its name.
     """
     settle(folder)
     old = folder.with_name(folder.name + OLD)
-    if folder.exists():
-        folder.rename(old)
+    if os.path.lexists(folder):
+        marked.check(folder, None, folder.parent)
+        if os.path.lexists(old):
+            raise FilesError(f"{old} was not made by ARTO and is in the way: move it away")
+        moved(folder, old)
     try:
         complete.rename(folder)
     except OSError:
-        if old.exists():
+        if os.path.lexists(old):
             old.rename(folder)
         raise
-    # if a file of the older folder is still open, the next call removes what is left
-    shutil.rmtree(old, ignore_errors=True)
+    # what is left of it is found and removed by the next one
+    settle(folder)
 
 
 class Lock:
     """Holds a folder for one process, as a context manager.
 
-    The operating system lets go of the lock when the process ends, however it ends.
+    The operating system lets go of the lock when the process ends, however it ends. The lock is a
+    file and never a link, and nothing is written into a file that is no lock.
 
     Parameters
     ----------
@@ -150,8 +197,8 @@ class Lock:
     ------
     BusyError
         Another process holds the folder. The message names it.
-    OSError
-        The folder cannot be written.
+    FilesError
+        The folder cannot be written, or another file has the lock's name.
     """
 
     NAME = "lock"
@@ -159,24 +206,37 @@ class Lock:
     def __init__(self, folder: Path, doing: str) -> None:
         self.path = folder / self.NAME
         self.doing = doing
-        self._file: IO[str] | None = None
+        self._handle: int | None = None
 
     def __enter__(self) -> Lock:
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        file = self.path.open("a+", encoding="utf-8")
         try:
-            _lock_soon(file)
-        except OSError:
-            file.seek(0)
-            holder = file.read().strip() or "another process"
-            file.close()
-            raise BusyError(
-                f"{self.path.parent} is in use: {holder}; wait until it is done, or end it there"
-            ) from None
-        file.truncate(0)
-        file.write(f"{self.doing}, process {os.getpid()}")
-        file.flush()
-        self._file = file
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            handle = _open_lock(self.path, os.O_RDWR | os.O_CREAT)
+        except OSError as e:
+            raise FilesError(
+                f"{self.path.parent} cannot be locked ({e}): see who may write there, or choose "
+                "another folder"
+            ) from e
+        try:
+            said = _said(handle, self.path)
+            try:
+                _lock_soon(handle)
+            except OSError:
+                raise BusyError(
+                    f"{self.path.parent} is in use: {said or 'another process'}; wait until it is "
+                    "done, or end it there"
+                ) from None
+            try:
+                os.ftruncate(handle, 0)
+                _write(handle, f"{self.doing}, process {os.getpid()}")
+            except OSError as e:
+                with contextlib.suppress(OSError):
+                    os.ftruncate(handle, 0)
+                raise FilesError(f"{self.path} cannot be written ({e}): make room") from e
+        except BaseException:
+            os.close(handle)
+            raise
+        self._handle = handle
         return self
 
     def __exit__(
@@ -185,16 +245,16 @@ class Lock:
         error: BaseException | None,
         at: TracebackType | None,
     ) -> None:
-        if self._file:
-            # the file is emptied and kept: another process may have opened it to lock it
+        if self._handle is not None:
+            # emptied, not removed: another process may have it open already, to lock it
             with contextlib.suppress(OSError):
-                self._file.truncate(0)
-            self._file.close()
-            self._file = None
+                os.ftruncate(self._handle, 0)
+            os.close(self._handle)
+            self._handle = None
 
     @staticmethod
     def holder(folder: Path) -> str:
-        """Say which process holds a folder.
+        """Say which process holds a folder. Nothing is written.
 
         Parameters
         ----------
@@ -206,42 +266,77 @@ class Lock:
             What the process does and its number; empty where no process holds the folder.
         """
         path = folder / Lock.NAME
-        if not path.is_file():
-            return ""
         try:
-            with Lock(folder, "looking"):
-                return ""
-        except BusyError:
-            with contextlib.suppress(OSError):
-                return path.read_text(encoding="utf-8").strip() or "another process"
-            return "another process"
+            handle = _open_lock(path, os.O_RDWR if os.name == "nt" else os.O_RDONLY)
         except OSError:
             return ""
+        said = ""
+        try:
+            said = _said(handle, path)
+            _lock_soon(handle, shared=True)
+            return ""
+        except OSError:
+            return said or "another process"
+        except FilesError:
+            return ""
+        finally:
+            os.close(handle)
 
 
-# Windows locks bytes, and locked bytes cannot be read: so a byte far behind the text is locked.
+# A lock says what is done and by which process, or nothing.
+_FORM = re.compile(r"(?s:.{0,2000}), process \d{1,10}")
+_MOST = 8192
+
+
+def _open_lock(path: Path, how: int) -> int:
+    """Open a lock, which is a regular file and no link. Raises OSError."""
+    if os.name == "nt" and path.is_symlink():
+        raise OSError(f"{path} is a link")
+    handle = os.open(path, how | SAFELY, 0o666)
+    state = os.fstat(handle)
+    if not stat.S_ISREG(state.st_mode) or state.st_nlink > 1:
+        os.close(handle)
+        raise OSError(f"{path} is a link, or no regular file: move it away")
+    return handle
+
+
+def _said(handle: int, path: Path) -> str:
+    """What a lock says. Raises FilesError for a file that is no lock."""
+    os.lseek(handle, 0, os.SEEK_SET)
+    text = os.read(handle, _MOST + 1).decode("utf-8", "replace").strip()
+    if text and not _FORM.fullmatch(text):
+        raise FilesError(f"{path} is no lock of ARTO's: move it away")
+    return text
+
+
+def _write(handle: int, text: str) -> None:
+    data = text.encode("utf-8", "replace")
+    os.lseek(handle, 0, os.SEEK_SET)
+    if os.write(handle, data) != len(data):
+        raise OSError("there is no room")
+
+
+# Windows locks bytes and lets nobody else read them: one far behind the text is locked.
 _BYTE = 1 << 20
 
 if sys.platform == "win32":
     import msvcrt
 
-    def _lock(file: IO[str]) -> None:
-        file.seek(_BYTE)
-        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+    def _lock(handle: int, shared: bool) -> None:
+        os.lseek(handle, _BYTE, os.SEEK_SET)
+        msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
 else:
     import fcntl
 
-    def _lock(file: IO[str]) -> None:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    def _lock(handle: int, shared: bool) -> None:
+        # who only looks asks for a share of it, for which a file that may be read is enough
+        fcntl.flock(handle, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
 
 
-def _lock_soon(file: IO[str]) -> None:
-    """Lock a file, and try again for a moment where that fails.
-
-    `Lock.holder` locks the file only to see whether it can, and lets go at once.
-    """
+def _lock_soon(handle: int, shared: bool = False) -> None:
+    """Lock it; who only looks whether it is locked (`Lock.holder`) is gone in a moment."""
     for _ in range(4):
         with contextlib.suppress(OSError):
-            return _lock(file)
+            return _lock(handle, shared)
         time.sleep(0.02)
-    return _lock(file)
+    return _lock(handle, shared)

@@ -7,15 +7,13 @@ frame and the size. The look of the scene is kept apart from it, in the fingerpr
 from __future__ import annotations
 
 import hashlib
-import math
 import re
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
+from .description import DEVICES, is_finite
 from .errors import ShotError
 
-# Names that Windows keeps for devices, whatever ending they have.
-_DEVICES = {"CON", "PRN", "AUX", "NUL"} | {f"{n}{i}" for n in ("COM", "LPT") for i in range(1, 10)}
 # Characters that file systems refuse, characters that have a meaning in Blender's paths (braces, #,
 # %), and `~`, which marks the names that were changed here.
 _UNSAFE = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*{}#%~]')
@@ -62,7 +60,7 @@ def safe_name(name: str) -> str:
     """
     out = _UNSAFE.sub("_", name).strip(" ").rstrip(". ")
     out = out.encode("utf-8", "replace")[:_LONGEST].decode("utf-8", "ignore").rstrip(". ")
-    device = out.split(".")[0].rstrip().upper() in _DEVICES
+    device = out.split(".")[0].rstrip().upper() in DEVICES
     if out == name and out and not device:
         return out
     return f"{'_' if device else ''}{out or '_'}~{short_hash(name)}"
@@ -169,8 +167,9 @@ class Shot:
             if not isinstance(value, kind) or isinstance(value, bool):
                 raise ShotError(f"a shot's {name} cannot be {value!r:.60}")
         numbers = (*out.camera_matrix, *(out.region or ()), out.subframe or 0, out.frame)
-        plain = all(type(x) in (int, float) and math.isfinite(x) for x in numbers)
-        if not plain or not all(isinstance(x, int | float | str) for x in out.lens):
+        if not all(map(is_finite, numbers)) or not all(
+            isinstance(x, int | float | str) for x in out.lens
+        ):
             raise ShotError("a shot's camera, lens or region is no row of numbers")
         return out
 

@@ -31,7 +31,7 @@ from .asked import asked, begun
 from .check import check_scene
 from .plan import SAMPLED, render_plan
 from .planned import Given
-from .resume import empty, finish, finish_field, let_go, unfinished
+from .resume import empty, empty_take, finish, finish_field, let_go, unfinished
 from .stream import Stream
 
 
@@ -104,7 +104,7 @@ def _capture(
         yield from _finish(scene, *each)
     if not this.catchers:
         for name in takes.TAKES:
-            empty(claimed / name)
+            empty_take(claimed / name)
     paths.forget()
     caution = f". CAUTION: {head['caution']['text']}" if head.get("caution") else ""
     yield Progress(1.0, f"captured {head['patches']} patches{caution}")
@@ -246,7 +246,7 @@ def _render(
         with around:
             yield request
             request.check()
-        if not partial.is_file():
+        if not partial.stat().st_size:
             raise CaptureSetError(
                 f"Blender did not write {path}: make room on the disk, or choose a folder that "
                 "can be written"

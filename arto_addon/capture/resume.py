@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from ...core import marked
 from ...core.capture.capture_set import HEADER, CaptureSet, write_header
 from ...core.errors import ArtoError, CaptureSetError, FieldError
 from ...core.field.field import Field
@@ -24,15 +25,33 @@ def unfinished(folder: Path, key: str) -> dict[str, Any] | None:
             if there.get("key") == key:
                 # what a process that was killed was writing
                 for partial in folder.glob("*" + PART):
-                    partial.unlink(missing_ok=True)
+                    marked.remove_file(partial, "capture")
                 return there
     return None
 
 
 def empty(folder: Path) -> None:
+    """Remove a capture set. Raises FilesError where it was not made by ARTO, CaptureSetError."""
+    with _removing(folder):
+        marked.remove(folder, "capture", folder.parent)
+
+
+def empty_take(folder: Path) -> None:
+    """Remove what ARTO has made in the folder of a take, and the folder where nothing else is in
+    it. Raises CaptureSetError."""
+    if not marked.is_folder(folder):
+        return
+    with _removing(folder):
+        for there in list(folder.iterdir()):
+            if (kind := marked.kind_of(there)) in ("capture", "field"):
+                marked.remove(there, kind, folder)
+        marked.remove_empty(folder)
+
+
+@contextlib.contextmanager
+def _removing(folder: Path) -> Iterator[None]:
     try:
-        if folder.exists():
-            shutil.rmtree(folder)
+        yield
     except OSError as e:
         raise CaptureSetError(f"{folder} cannot be emptied ({e}): choose another folder") from e
 
@@ -56,7 +75,7 @@ def let_go(folder: Path, head: dict[str, Any], number: int, fitted: dict[str, An
     entry["fitted"] = fitted
     write_header(folder, head)
     for name in files:
-        (folder / name).unlink(missing_ok=True)
+        marked.remove_file(folder / name, "capture")
 
 
 def finish_field(unfinished: Path, folder: Path, head: dict[str, Any]) -> None:

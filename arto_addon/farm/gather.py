@@ -8,6 +8,7 @@ from typing import Any
 
 import bpy
 
+from ...core import marked
 from ...core.capture.capture_set import CaptureSet, write_header
 from ...core.errors import ArtoError, FarmError
 from ...core.field.field import proxy_folder
@@ -15,7 +16,7 @@ from ...core.field.proxy import FACTORS
 from ...core.files import PART, Lock
 from ...core.fit.fit import fit_into
 from ..capture.capture import check_file, plan_of
-from ..capture.resume import empty, finish, finish_field, let_go
+from ..capture.resume import empty_take, finish, finish_field, let_go
 from ..capture.stream import Stream
 from ..fit.guides import cleaned
 from ..shot import paths, scene_id
@@ -67,11 +68,13 @@ def gather(job_folder: Path) -> Steps:
                     yield from _placed(scene, job.set_folder(frame, take), claimed / take)
                 if left and frame not in job.catchers:
                     for take in TAKES:
-                        empty(claimed / take)
+                        empty_take(claimed / take)
             folders.append(claimed / "field")
     paths.forget()
-    for partial in (job.folder / "parts").glob("*" + PART):
-        shutil.rmtree(partial, ignore_errors=True)
+    parts = job.folder / "parts"
+    for partial in list(parts.iterdir()) if parts.is_dir() else []:
+        if partial.name.endswith(PART):
+            marked.remove_quietly(partial, "part", parts)
     yield Progress(1.0, f"gathered {len(job.parts)} parts into {len(folders)} fields")
     return folders
 
@@ -120,7 +123,7 @@ def _joined(job: Job, frame: int, take: str, parts: dict[Part, dict[str, Any]]) 
             captured = CaptureSet(folder, unfinished=True)
             let_go(folder, head, tile, (yield from _fit(captured, tile, job.tiles)))
     for part in parts:
-        shutil.rmtree(job.part_folder(part), ignore_errors=True)
+        marked.remove_quietly(job.part_folder(part), "part", job.folder)
 
 
 def _take(
@@ -155,8 +158,9 @@ def _take_field(source: Path, field: Path, name: str) -> None:
     ]:
         if (here / name).exists():
             there.mkdir(parents=True, exist_ok=True)
+            marked.mark(there, "field")
             if (there / name).is_dir():
-                shutil.rmtree(there / name)
+                marked.remove(there / name, "tile", there)
             (here / name).replace(there / name)
 
 
@@ -176,10 +180,9 @@ def _placed(scene: bpy.types.Scene, folder: Path, place: Path) -> Steps:
         if folder.stat().st_dev != place.stat().st_dev:
             # folders are put in each other's place on one disk alone; the job's go last, so that
             # who was killed does it again
-            near = place / (folder.name + PART)
-            shutil.rmtree(near, ignore_errors=True)
+            near = marked.scratch(place / folder.name, "capture")
             yield Progress(0.99, f"copying {folder.name} to {place}")
-            shutil.copytree(folder, near)
+            shutil.copytree(folder, near, dirs_exist_ok=True)
     except OSError as e:
         raise FarmError(f"{place} cannot be written ({e}): make room, and gather again") from e
     head = CaptureSet(near).head
@@ -191,4 +194,4 @@ def _placed(scene: bpy.types.Scene, folder: Path, place: Path) -> Steps:
         yield from cleaned(scene, place / "field")
     finish(near, place / "capture")
     if near != folder:
-        shutil.rmtree(folder)
+        marked.remove(folder, "capture", folder.parent)

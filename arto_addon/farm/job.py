@@ -19,6 +19,7 @@ import bpy
 from ...core.capture.capture_set import CaptureSet
 from ...core.description import Description
 from ...core.errors import FarmError
+from ...core.field.writer import tile_names
 from ...core.files import write_text
 from ...core.region import Region
 from ..capture import room
@@ -33,6 +34,7 @@ from ..stage.takes import TAKES, WHOLE
 # Version 1 knows no takes beside the first, and so has none.
 VERSION = 2
 READABLE = (1, VERSION)
+FORMAT = "ARTO farm job"
 HEADER = "job.json"
 PART_HEADER = "part.json"
 MOST = 1_000_000
@@ -154,6 +156,11 @@ class Job:
         files = said.kind("files", list, [])
         said.data["files"] = [said.file_name(name, "files") for name in files]
         said.kind("samples", int, 0)
+        if fitted := said.kind("fitted", dict):
+            # what it names is moved into the frame's field, in place of what has that name there
+            name = fitted.get("file") or fitted.get("folder")
+            if said.file_name(name, "fitted") not in tile_names(part.tile):
+                raise said.wrong("fitted", name)
         return said.data
 
     @contextmanager
@@ -173,6 +180,14 @@ class Job:
                 yield scene, self.view_layer
             finally:
                 _set(scene, before)
+
+
+def is_job(path: Path) -> bool:
+    """Whether a file says that it is the description of a farm's job, of whatever version."""
+    try:
+        return Description(path, FarmError).data.get("format") == FORMAT
+    except FarmError:
+        return False
 
 
 def set_folder(folder: Path, frame: int, take: str) -> Path:
@@ -222,7 +237,7 @@ def write(
     Raises FarmError."""
     blend = Path(home.file())
     data = {
-        "format": "ARTO farm job",
+        "format": FORMAT,
         "version": VERSION,
         "blend": blend.name,
         "blender": bpy.app.version_string,

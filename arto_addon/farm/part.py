@@ -4,8 +4,6 @@ the only seed and no images are kept, fitted."""
 from __future__ import annotations
 
 import json
-import os
-import shutil
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,9 +12,10 @@ from typing import Any
 
 import bpy
 
+from ...core import marked
 from ...core.capture.capture_set import CaptureSet
 from ...core.errors import FarmError
-from ...core.files import PART, replace_folder, write_text
+from ...core.files import replace_folder, write_text
 from ...core.fit.fit import fit_into
 from ...core.shot import Shot
 from ..blender.output import write_to
@@ -46,10 +45,10 @@ def render_part(job_folder: Path, number: int) -> Steps:
     fitted = job.seeds == 1 and not captured.kept
     room.check_memory(estimate(captured.head, fitted).memory, part.name)
     begun = time.perf_counter()
-    # by its process: a farm may have given the part to two machines
-    partial = folder.with_name(f"{part.name}.{os.getpid()}{PART}")
+    partial: Path | None = None
     try:
-        partial.mkdir(parents=True)
+        # with a name of its own: a farm may have given the part to two machines
+        partial = marked.scratch(folder, "part")
         with _on_stage(job, part, captured) as this:
             files = yield from render_tile(this.on, captured.head, part.tile, partial)
         told: dict[str, Any] = {"part": part.to_json(), "key": captured.head["key"]}
@@ -57,7 +56,7 @@ def render_part(job_folder: Path, number: int) -> Steps:
         if fitted:
             told["fitted"] = yield from _fitted(captured, part, partial, files)
             for name in files:
-                (partial / name).unlink()
+                marked.remove_file(partial / name, "part")
             files = []
         told |= {"files": files, "seconds": round(time.perf_counter() - begun, 3)}
         write_text(partial / PART_HEADER, json.dumps(told, indent=1))
@@ -65,7 +64,8 @@ def render_part(job_folder: Path, number: int) -> Steps:
     except OSError as e:
         raise FarmError(f"{folder} cannot be written ({e}): make room, or see who may write") from e
     finally:
-        shutil.rmtree(partial, ignore_errors=True)
+        if partial:
+            marked.remove_quietly(partial, "part", folder.parent)
     yield Progress(1.0, f"rendered {part.name}")
     return folder
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import os
+import re
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,8 +12,9 @@ from typing import Any
 
 import bpy
 
-from ...core.capture.capture_set import write_header
-from ...core.errors import FarmError
+from ...core import marked
+from ...core.capture.capture_set import CaptureSet, write_header
+from ...core.errors import CaptureSetError, FarmError
 from ...core.fit.choice import check as check_choice
 from ...core.patterns import pattern_set
 from ...core.units import size
@@ -52,10 +55,7 @@ def plan(
             "another folder"
         )
     check_choice(scene.arto.support, pattern_set(scene.arto.patterns), scene.arto.separate)
-    # first, so that who is killed while planning leaves no job
-    (folder / job.HEADER).unlink(missing_ok=True)
-    for old in folder.glob("frame_*"):
-        shutil.rmtree(old)
+    _make_way(folder, [scene.frame_current] if frames is None else list(frames))
     # as `capture` takes the scene as it stands, and `capture_frames` whole frames together
     several = frames is not None
     subframe = 0.0 if several else scene.frame_subframe
@@ -92,6 +92,47 @@ def plan(
         f"seeds; {size(needed)} of disk until they are gathered{told}",
     )
     return folder
+
+
+def _make_way(folder: Path, frames: list[int]) -> None:
+    """Remove the job that was planned into a folder before, of which nothing is rendered. Raises
+    FarmError where something else is in the way; then nothing has been touched."""
+    header = folder / job.HEADER
+    if os.path.lexists(header):
+        try:
+            job.Job(folder)
+        except FarmError as e:
+            if not job.is_job(header):
+                raise FarmError(f"{header} is no job of ARTO's: plan into another folder") from e
+    templates.check(folder)
+    sets = [there for there in _frames_in(folder) if _is_planned(there)]
+    taken = {job.set_folder(folder, frame, take) for frame in frames for take in (WHOLE, *TAKES)}
+    for there in sorted(taken - set(sets)):
+        if os.path.lexists(there):
+            raise FarmError(
+                f"{there} was not planned by ARTO, or has rendered tiles: plan into another folder"
+            )
+    # the description first, so that who is killed while planning leaves no job
+    if os.path.lexists(header):
+        marked.remove_own_file(header, job.is_job)
+    for there in sets:
+        marked.remove(there, "capture", folder)
+
+
+def _frames_in(folder: Path) -> list[Path]:
+    form = re.compile(rf"frame_-?\d{{3,}}(_({'|'.join(TAKES)}))?")
+    return [p for p in folder.iterdir() if form.fullmatch(p.name)] if folder.is_dir() else []
+
+
+def _is_planned(folder: Path) -> bool:
+    """Whether a folder is a capture set of which nothing is rendered."""
+    if marked.kind_of(folder) != "capture":
+        return False
+    try:
+        head = CaptureSet(folder, unfinished=True).head
+    except CaptureSetError:
+        return False
+    return not any(entry["done"] for entry in head["tiles"])
 
 
 def _heads(

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
 import shlex
-import shutil
 from pathlib import Path
 from typing import Any
 
+from ...core.description import MOST_BYTES
+from ...core.errors import FarmError
 from ...core.files import write_text
+from ...core.regular import read_regular
 from .job import Job
 
 OPENJD = "openjd.json"
@@ -27,7 +30,22 @@ def write(job: Job) -> None:
     """Write them into the job's folder."""
     write_text(job.folder / OPENJD, json.dumps(openjd(job), indent=1))
     write_text(job.folder / LINES, "\n".join(lines(job)) + "\n")
-    shutil.copyfile(Path(__file__).with_name(FLAMENCO), job.folder / FLAMENCO)
+    script = Path(__file__).with_name(FLAMENCO).read_text(encoding="utf-8")
+    write_text(job.folder / FLAMENCO, script)
+
+
+def check(folder: Path) -> None:
+    """Raise FarmError where a file of others has the name of one that is written."""
+    for name, says in ((OPENJD, '"ARTO '), (LINES, "--command arto gather"), (FLAMENCO, "ARTO")):
+        path = folder / name
+        if not os.path.lexists(path):
+            continue
+        try:
+            ours = says in read_regular(path, MOST_BYTES).decode("utf-8", "replace")
+        except OSError:
+            ours = False
+        if not ours:
+            raise FarmError(f"{path} was not written by ARTO: plan into another folder")
 
 
 def openjd(job: Job) -> dict[str, Any]:

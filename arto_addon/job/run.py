@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-import shutil
 import signal
 import threading
 import time
@@ -20,6 +19,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ...core import marked
 from ...core.errors import ArtoError, CancelledError, SceneError
 from ..blender import devices
 from ..blender.compositing import places_of_groups
@@ -56,7 +56,7 @@ def main(path: Path) -> int:
         state, code = State(writer.share, f"{type(e).__name__}: {e}", end="failed"), 1
     told.done = True
     if told.alone:
-        shutil.rmtree(folder, ignore_errors=True)  # nobody is left to do it
+        marked.remove_quietly(folder, "job", folder.parent)  # nobody is left to do it
     else:
         state.write(folder)
     print(f"ARTO job: {state.end}: {state.text}", flush=True)
@@ -126,7 +126,7 @@ class _Told:
             time.sleep(0.1)
         if not self.done:
             if self.alone:
-                shutil.rmtree(self.folder, ignore_errors=True)
+                marked.remove_quietly(self.folder, "job", self.folder.parent)
             os._exit(130)
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import re
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -20,6 +19,7 @@ from pathlib import Path
 import bpy
 from bpy.app.handlers import persistent
 
+from ...core import marked
 from ...core.errors import ArtoError, BusyError, SceneError
 from ...core.files import Lock
 from ...core.units import clock
@@ -66,6 +66,7 @@ class Job:
                 f"{claimed} is in use: {holder}; wait until it is done, or end it there"
             )
         self.folder = Path(tempfile.mkdtemp(prefix="job-", dir=claimed))
+        marked.mark(self.folder, "job")
         self.lock = Lock(self.folder, "following").__enter__()
         try:
             blend, task = snapshot.take(self.folder, verb, scene, view_layer)
@@ -131,7 +132,7 @@ class Job:
         if log := getattr(self, "log", None):
             log.close()
         self.lock.__exit__(None, None, None)
-        shutil.rmtree(self.folder, ignore_errors=True)
+        marked.remove_quietly(self.folder, "job", self.folder.parent)
 
     @property
     def spent(self) -> float:
@@ -164,8 +165,8 @@ def _command(blend: Path, task: Path) -> list[str]:
 def _remove_leftovers(claimed: Path) -> None:
     """Folders of jobs whose windows are gone without a word."""
     for folder in claimed.glob("job-*"):
-        if folder.is_dir() and not Lock.holder(folder):
-            shutil.rmtree(folder, ignore_errors=True)
+        if not Lock.holder(folder):
+            marked.remove_quietly(folder, "job", claimed)
 
 
 current: Job | None = None

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -22,6 +21,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core import marked
 from ...core.errors import ArtoError, SceneError
 from ..blender.colour import work_in, working_space
 from ..blender.nodes import shader_tree, trees
@@ -65,6 +65,7 @@ class Maps:
         """Raises SceneError where there is no room for its files."""
         try:
             self._folder = Path(tempfile.mkdtemp(prefix="arto-live-"))
+            marked.mark(self._folder, "maps")
         except OSError as e:
             raise SceneError(f"there is no room for temporary files ({e})") from e
         self._process: subprocess.Popen[str] | None = None
@@ -201,7 +202,7 @@ class Maps:
                 self._process.wait(_REAP)
             except subprocess.TimeoutExpired:
                 self._process.kill()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        marked.remove_quietly(self._folder, "maps", self._folder.parent)
 
 
 def images(world: bpy.types.World) -> list[bpy.types.Image]:
@@ -258,7 +259,7 @@ def _made(asked: Asked) -> str:
         np.save(asked.out, found.image)
     finally:
         bpy.data.worlds.remove(world)
-        Path(asked.blend).unlink(missing_ok=True)
+        marked.remove_file(Path(asked.blend), "maps")
         bpy.data.orphans_purge(do_recursive=True)
     return asked.out
 

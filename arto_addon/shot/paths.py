@@ -9,6 +9,7 @@ folder of the file it was copied from.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -19,16 +20,20 @@ from pathlib import Path
 
 import bpy
 
+from ...core import marked
 from ...core.capture.capture_set import HEADER as CAPTURE_HEADER
+from ...core.description import Description
 from ...core.errors import ArtoError, SceneError, ShotError
 from ...core.field.field import HEADER as FIELD_HEADER
 from ...core.files import settle, write_text
+from ...core.regular import read_regular
 from ...core.shot import Shot, safe_name, short_hash
 from . import home
 from . import scene_id as scene_ids
 from .shot import shot_of
 
 HEADER = "shot.json"
+_MOST_BYTES = 1 << 20
 # Endings that an output may have by habit: what is written is EXR.
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr"}
 _SECONDS = 1.0  # for which a panel need not look at the disk again
@@ -67,12 +72,12 @@ def _root(scene: bpy.types.Scene) -> Path:
 def _shot_in(folder: Path) -> tuple[Shot, str] | None:
     """The shot whose folder this is and the .blend it was captured from, as seen from the root."""
     path = folder / HEADER
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-        return Shot.from_json(data["shot"]), str(data.get("blend", ""))
-    except FileNotFoundError:
+    if not os.path.lexists(path):
         return None
-    except (OSError, ValueError, KeyError, TypeError, RecursionError, ArtoError):
+    try:
+        said = Description(path, ShotError, _MOST_BYTES)
+        return Shot.from_json(said.data.get("shot")), said.kind("blend", str, "")
+    except ArtoError:
         # a folder whose shot cannot be read is nobody's: it is passed by, not written into
         return Shot("", 0, 0, 0, (), (), scene_id="damaged"), ""
 
@@ -119,7 +124,7 @@ def _look(root: Path, shot: Shot, origin: bpy.types.Scene | None) -> Place:
             was, blend = there
             if not _with_id(shot, scene_id).is_place_of(was):
                 continue
-            if blend and was.file != shot.file and (root / blend).is_file():
+            if blend and was.file != shot.file and _is_there(root, blend):
                 return Place(own, header.parent, f"the file '{Path(blend).name}'")
             if origin:
                 return Place(own, header.parent, f"the scene '{origin.name}'")
@@ -129,6 +134,14 @@ def _look(root: Path, shot: Shot, origin: bpy.types.Scene | None) -> Place:
     if any((earlier / n / h).is_file() for n, h in _HEADERS):
         return Place(own, earlier, earlier=True)
     return Place(own, own)
+
+
+def _is_there(root: Path, blend: str) -> bool:
+    """Whether a .blend that a description names is there. A machine of the network is not asked for
+    what a file names: on Windows that would tell it the artist's name and password."""
+    if blend.startswith(("//", "\\\\")) and not str(root).startswith(blend[:2]):
+        return False
+    return (root / blend).is_file()
 
 
 _HEADERS = (("capture", CAPTURE_HEADER), ("field", FIELD_HEADER))
@@ -213,7 +226,7 @@ def claim(scene: bpy.types.Scene, view_layer: str) -> Path:
     text = json.dumps(about)
     try:
         path = folder / HEADER
-        if not path.is_file() or path.read_text(encoding="utf-8") != text:
+        if not _says(path, text):
             write_text(path, text)
     except OSError as e:
         raise SceneError(
@@ -222,6 +235,13 @@ def claim(scene: bpy.types.Scene, view_layer: str) -> Path:
         ) from e
     _found.clear()
     return folder
+
+
+def _says(path: Path, text: str) -> bool:
+    """Whether a file has that text already."""
+    with contextlib.suppress(OSError):
+        return read_regular(path, _MOST_BYTES) == text.encode()
+    return False
 
 
 def worlds_folder(scene: bpy.types.Scene) -> Path:
@@ -241,16 +261,25 @@ def adopt(scene: bpy.types.Scene, view_layer: str, source: Path) -> Path:
     replaced. Raises SceneError.
     """
     folder = claim(scene, view_layer)
-    for name in ("capture", "field", "ground", "things"):
+    for name in _KINDS:
         if (source / name).is_dir() and not (folder / name).exists():
-            partial = folder / f"{name}.part"
+            partial: Path | None = None
             try:
+                partial = marked.scratch(folder / name, _KINDS[name])
                 _share(source / name, partial)
                 partial.rename(folder / name)
             except OSError as e:
+                if partial:
+                    marked.remove_quietly(partial, _KINDS[name], folder)
                 raise SceneError(f"{source / name} cannot be taken over ({e}): make room") from e
     _found.clear()
     return folder
+
+
+# What of a shot may be another's too.
+_KINDS: dict[str, marked.Kind] = {
+    "capture": "capture", "field": "field", "ground": "take", "things": "take",
+}  # fmt: skip
 
 
 def _share(source: Path, target: Path) -> None:
@@ -261,9 +290,8 @@ def _share(source: Path, target: Path) -> None:
             shutil.copy2(a, b)
         return b
 
-    if target.exists():
-        shutil.rmtree(target)
-    shutil.copytree(source, target, copy_function=link)
+    marks = shutil.ignore_patterns(marked.MARK)  # the target has its own
+    shutil.copytree(source, target, copy_function=link, ignore=marks, dirs_exist_ok=True)
 
 
 def relit_name(scene: bpy.types.Scene, look: str | None = None) -> str:

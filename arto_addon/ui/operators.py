@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import bpy
 
+from ...core import marked
 from ...core.capture.capture_set import HEADER as CAPTURE_HEADER
 from ...core.errors import ArtoError, SceneError
 from ...core.field.field import HEADER as FIELD_HEADER
@@ -274,10 +274,10 @@ def own_place(scene: bpy.types.Scene) -> paths.Place:
     return place
 
 
-def remove_folder(folder: Path) -> None:
-    """Raises SceneError."""
+def remove_capture(folder: Path, place: paths.Place) -> None:
+    """Remove a capture set of a shot. Raises FilesError where ARTO has not made it, SceneError."""
     try:
-        shutil.rmtree(folder)
+        marked.remove(folder, "capture", place.folder)
     except OSError as e:
         raise SceneError(f"{folder} cannot be removed ({e})") from e
 
@@ -303,7 +303,7 @@ class ARTO_OT_discard_unfinished(Quick):
                 *place.folder.glob("unfinished-*"),
                 *place.folder.glob("*/unfinished-*"),
             ]:
-                remove_folder(folder)
+                remove_capture(folder, place)
                 gone += 1
         paths.forget()
         return f"removed {gone} unfinished captures" if gone else "there is none unfinished"

@@ -21,7 +21,7 @@ from ..world import controls
 from ..world.check import world_of
 from . import state
 from .long_work import LongWork
-from .operators import Quick, can_capture, can_relight, free, own_place, remove_folder
+from .operators import Quick, can_capture, can_relight, free, own_place, remove_capture
 
 
 class ARTO_OT_shoot(LongWork):
@@ -94,7 +94,7 @@ class ARTO_OT_delete_capture(Quick):
             for take in ("", "ground", "things"):
                 folder = place.folder / take / "capture"
                 if folder.is_dir():
-                    remove_folder(folder)
+                    remove_capture(folder, place)
         paths.forget()
         return "deleted the capture; the shot can still be relit"
 

@@ -16,8 +16,8 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ...core import arrays, marked
 from ...core.errors import SceneError
-from ...core.files import whole
 from ...core.light.environment import Environment
 from ..blender.colour import working_space
 from ..blender.nodes import shader_tree, trees
@@ -89,10 +89,10 @@ def painted(
 
 def _read(path: Path, width: int) -> np.ndarray | None:
     try:
-        image = np.load(path)
-        os.utime(path)
-    except (OSError, ValueError, EOFError):
-        return None
+        image = arrays.read(path, width // 2 * width * 3 * 4)
+        os.utime(path, follow_symlinks=False)
+    except (OSError, ValueError, NotImplementedError):
+        return None  # it is made again
     good = image.dtype == np.float32 and image.shape == (width // 2, width, 3)
     return image if good and np.isfinite(image).all() else None
 
@@ -101,11 +101,10 @@ def _write(path: Path, image: np.ndarray) -> None:
     """Keep a map, where there is room for it; the oldest ones go."""
     with contextlib.suppress(OSError):  # it is made again then
         path.parent.mkdir(parents=True, exist_ok=True)
-        with whole(path) as partial, partial.open("wb") as f:
-            np.save(f, image)
-        kept = sorted(path.parent.glob("*.npy"), key=lambda p: p.stat().st_mtime_ns)
-        for old in kept[:-MOST]:
-            old.unlink()
+        arrays.write(path, image)
+        kept = [p for p in path.parent.glob("*.npy") if arrays.is_signed(p)]
+        for old in sorted(kept, key=lambda p: p.stat().st_mtime_ns)[:-MOST]:
+            marked.remove_own_file(old, arrays.is_signed)
 
 
 def _key(scene: bpy.types.Scene, world: bpy.types.World, width: int) -> str:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import exr
+from .. import exr, marked
 from ..description import Description
 from ..errors import CaptureSetError, HemicubeError, PatternError
 from ..files import write_text
@@ -137,6 +137,8 @@ def write_header(folder: Path, head: dict[str, Any]) -> None:
     """Write `capture.json`, whole or not at all."""
     path = folder / HEADER
     try:
+        folder.mkdir(parents=True, exist_ok=True)
+        marked.mark(folder, "capture")
         write_text(path, json.dumps(head, indent=1))
     except OSError as e:
         raise CaptureSetError(

@@ -7,14 +7,16 @@ has tiles of both kinds.
 
 from __future__ import annotations
 
-import stat
+import math
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import LONGEST_HEAD, head
 from ..errors import FieldError
 from ..files import whole
+from ..regular import open_regular
 
 
 class TileFolder:
@@ -32,11 +34,15 @@ class TileFolder:
         """One of its arrays, mapped and read only. Raises FieldError where there is none."""
         path = self.path / f"{name}.npy"
         try:
-            # a pipe in its place would be waited for
-            if not stat.S_ISREG(path.stat().st_mode):
-                raise OSError("it is no file")
-            return np.lib.format.open_memmap(path, mode="r")
-        except (OSError, ValueError, EOFError) as e:
+            with open_regular(path) as file:
+                shape, dtype, first = head(file.read(LONGEST_HEAD))
+                size = file.seek(0, 2)
+            if first + math.prod(shape) * dtype.itemsize != size:
+                raise ValueError(f"it has not the size of its shape {shape}")
+            if not math.prod(shape):
+                return np.zeros(shape, dtype)  # nothing to map
+            return np.memmap(path, dtype, "r", first, shape)
+        except (OSError, ValueError) as e:
             raise FieldError(f"{path} is missing or damaged ({e}): fit again") from e
 
 

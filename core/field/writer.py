@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-import shutil
+import os
 from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
 
+from .. import marked
 from ..errors import FieldError
 from ..files import PART, replace_folder, write_text
 from ..hemicube import Hemicube
@@ -34,6 +35,12 @@ def describe(hemicube: Hemicube, shape: tuple[int, int], **about: Any) -> dict[s
     }
 
 
+def tile_names(number: int) -> tuple[str, str]:
+    """What a tile is called in the folder of its field: its file, and the folder that it was in
+    fields of the version before."""
+    return f"tile_{number:04d}{SUFFIX}", f"tile_{number:04d}"
+
+
 def write_tile(
     folder: Path, number: int, tile: TileWriter, hemicube: Hemicube, of: Path | None = None
 ) -> dict[str, Any]:
@@ -43,10 +50,12 @@ def write_tile(
     number: tiles are written from the top; of: the field that it will be, for messages. Raises
     FieldError.
     """
-    name = f"tile_{number:04d}{SUFFIX}"
+    name, _ = tile_names(number)
 
     def write(tile: TileWriter, folder: Path) -> dict[str, Any]:
         r = tile.region
+        folder.mkdir(parents=True, exist_ok=True)
+        marked.mark(folder, "field")
         with written(folder / name) as out:
             used = tile.write(out)
         return {"file": name, "region": [r.x, r.y, r.width, r.height], "entries": used}
@@ -63,6 +72,8 @@ def write_tile(
 def write_head(folder: Path, head: dict[str, Any]) -> None:
     """Write `field.json`: with it the field is one. Raises FieldError."""
     with _writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        marked.mark(folder, "field")
         for factor in FACTORS:
             tiles = [t.get("proxies", {}).get(str(factor)) for t in head["tiles"]]
             if tiles and all(tiles):
@@ -98,15 +109,21 @@ def replace_layers(field: Field, layers: dict[str, NDArray]) -> None:
 
 
 class FieldWriter:
-    """Writes a field tile by tile. It is there only once `close` has returned."""
+    """Writes a field tile by tile. It is there only once `close` has returned.
+
+    Raises FieldError where it cannot be written, and FilesError where what is at `folder` was not
+    made by ARTO.
+    """
 
     def __init__(self, folder: Path, hemicube: Hemicube, shape: tuple[int, int], **about: Any):
         self.folder, self.hemicube = folder, hemicube
-        self.partial = folder.with_name(folder.name + PART)
         self.head = describe(hemicube, shape, **about)
+        if os.path.lexists(folder):
+            marked.check(folder, None, folder.parent)  # before the work, and not after it
+        # what the version before left where its process was killed
+        marked.remove_quietly(folder.with_name(folder.name + PART), "field", folder.parent)
         with _writing(folder):
-            shutil.rmtree(self.partial, ignore_errors=True)
-            self.partial.mkdir(parents=True)
+            self.partial = marked.scratch(folder, "field")
 
     def add(self, tile: TileWriter) -> None:
         self.head["tiles"].append(
@@ -120,7 +137,7 @@ class FieldWriter:
 
     def abandon(self) -> None:
         """Remove what was written; a field that was there before stays."""
-        shutil.rmtree(self.partial, ignore_errors=True)
+        marked.remove_quietly(self.partial, "field", self.folder.parent)
 
 
 class _writing:

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from arto.core import marked
 from arto.core.errors import BusyError
 from arto.core.files import Lock, replace_folder, settle, whole, write_text
 
@@ -22,7 +23,7 @@ def test_a_failing_write_leaves_what_was_there(tmp_path: Path) -> None:
 
 
 def folder(path: Path, text: str) -> Path:
-    path.mkdir()
+    marked.make(path, "field")
     (path / "what").write_text(text)
     return path
 

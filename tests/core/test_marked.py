@@ -1,0 +1,256 @@
+"""Nothing is removed that ARTO has not made, and nothing of others is written into."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import arto
+import numpy as np
+import pytest
+from arto.core import marked
+from arto.core.capture import capture_set
+from arto.core.errors import BusyError, FilesError
+from arto.core.field.writer import FieldWriter
+from arto.core.files import Lock, replace_folder, settle, whole, write_text
+from arto.core.hemicube import Hemicube
+from arto.core.regular import read_regular
+
+needs_links = pytest.mark.skipif(os.name == "nt", reason="links need rights there")
+
+
+def others(folder: Path) -> Path:
+    """A folder of somebody else's."""
+    folder.mkdir(parents=True)
+    (folder / "comp.nk").write_text("mine")
+    return folder
+
+
+def test_only_one_module_removes() -> None:
+    """Whatever the project removes goes through `core.marked`; `files.whole` removes the file that
+    it has made itself."""
+    root = Path(arto.__file__).parent
+    found = set()
+    for path in [*root.glob("core/**/*.py"), *root.glob("arto_addon/**/*.py")]:
+        for line in path.read_text(encoding="utf-8").splitlines():
+            if re.search(r"rmtree|\.rmdir\(|\bos\.(remove|unlink|removedirs)\b", line) or (
+                re.search(r"\.unlink\(", line)
+                and not re.search(r"(children|objects)\.unlink", line)
+            ):
+                found.add(path.relative_to(root).as_posix())
+    assert found == {"core/marked.py", "core/files.py"}
+
+
+def test_a_folder_with_a_mark_is_removed(tmp_path: Path) -> None:
+    made = marked.make(tmp_path / "deep" / "job", "job")
+    (made / "inside").mkdir()
+    marked.remove(made, "job", tmp_path)
+    assert not made.exists()
+    marked.remove(made, "job", tmp_path)  # nothing is there
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "", "{", "[]", '{"format": "ARTO folder"}', '{"format": "ARTO folder", "version": 2}',
+        '{"format": "ARTO folder", "version": 1, "kind": "field"}',
+        '{"format": "ARTO folder", "version": 1, "kind": "else"}',
+        '{"format": "other", "version": 1, "kind": "job"}',
+        '{"format": "ARTO folder", "version": 1, "kind": ["job"]}', "[" * 100000,
+    ],
+)  # fmt: skip
+def test_another_mark_is_none(tmp_path: Path, said: str) -> None:
+    folder = others(tmp_path / "x")
+    (folder / marked.MARK).write_text(said)
+    with pytest.raises(FilesError, match="not made by ARTO"):
+        marked.remove(folder, "job", tmp_path)
+    assert (folder / "comp.nk").read_text() == "mine"
+
+
+def test_outside_nothing_is_removed(tmp_path: Path) -> None:
+    made = marked.make(tmp_path / "b" / "job", "job")
+    (tmp_path / "a").mkdir()
+    for path in (made, tmp_path / "a" / ".." / "b" / "job", tmp_path / "a" / ".."):
+        with pytest.raises(FilesError):
+            marked.remove(path, "job", tmp_path / "a")
+    assert made.is_dir()
+
+
+@needs_links
+def test_links_are_not_followed(tmp_path: Path) -> None:
+    theirs = others(tmp_path / "theirs")
+    made = marked.make(tmp_path / "made", "job")
+    (made / "caches").symlink_to(theirs)
+    (tmp_path / "link").symlink_to(made)
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "out").symlink_to(tmp_path)
+    for path in (tmp_path / "link", tmp_path / "in" / "out" / "made"):
+        with pytest.raises(FilesError):
+            marked.remove(path, "job", tmp_path / "in" if "in" in path.parts else tmp_path)
+    assert made.is_dir()
+    marked.remove(made, "job", tmp_path)
+    assert not made.exists() and (theirs / "comp.nk").read_text() == "mine"
+
+
+def test_what_the_version_before_made_is_known(tmp_path: Path) -> None:
+    """A capture set and a field without marks are ours, and with a file of others in them not."""
+    cube = Hemicube(faces=("top",), patches=1)
+    captured, field = tmp_path / "capture", tmp_path / "field"
+    basis = np.ones((1, 1, 2, 2, 3), np.float32)
+    capture_set.write(captured, cube, capture_set.pattern_set("white"), basis)
+    FieldWriter(field, cube, (2, 2)).close()
+    kinds: list[tuple[Path, marked.Kind]] = [(captured, "capture"), (field, "field")]
+    for folder, kind in kinds:
+        (folder / marked.MARK).unlink(missing_ok=True)
+        assert marked.kind_of(folder) == kind
+        (folder / "comp.nk").write_text("mine")
+        assert marked.kind_of(folder) is None
+        with pytest.raises(FilesError):
+            marked.remove(folder, kind, tmp_path)
+        (folder / "comp.nk").unlink()
+        marked.remove(folder, kind, tmp_path)
+
+
+def test_a_folder_of_others_is_not_marked(tmp_path: Path) -> None:
+    folder = others(tmp_path / "x")
+    marked.mark(folder, "capture")
+    assert sorted(p.name for p in folder.iterdir()) == ["comp.nk"]
+
+
+def test_a_folder_of_others_is_not_replaced(tmp_path: Path) -> None:
+    folder = others(tmp_path / "field")
+    made = marked.scratch(folder, "field")
+    with pytest.raises(FilesError, match="not made by ARTO"):
+        replace_folder(made, folder)
+    assert (folder / "comp.nk").exists() and made.is_dir()
+    with pytest.raises(FilesError):
+        FieldWriter(folder, Hemicube(faces=("top",), patches=1), (2, 2))
+
+
+def test_an_old_of_others_stays(tmp_path: Path) -> None:
+    old = others(tmp_path / "field.old")
+    there = marked.make(tmp_path / "field", "field")
+    settle(there)
+    with pytest.raises(FilesError, match="in the way"):
+        replace_folder(marked.scratch(there, "field"), there)
+    assert (old / "comp.nk").exists() and there.is_dir()
+    marked.remove(there, "field", tmp_path)
+    settle(there)
+    assert old.is_dir() and not there.exists()
+
+
+@needs_links
+@pytest.mark.parametrize("how", ["symbolic", "hard"])
+def test_a_lock_that_is_a_link_empties_nothing(tmp_path: Path, how: str) -> None:
+    theirs = tmp_path / ".bashrc"
+    theirs.write_text("export A=1")
+    shot = tmp_path / "shot"
+    shot.mkdir()
+    lock = shot / "lock"
+    if how == "symbolic":
+        lock.symlink_to(theirs)
+    else:
+        lock.hardlink_to(theirs)
+    assert Lock.holder(shot) == ""
+    with pytest.raises(FilesError, match="link"):
+        Lock(shot, "capturing").__enter__()
+    assert theirs.read_text() == "export A=1"
+
+
+@pytest.mark.parametrize("text", ["my own notes", "x" * 100000, "capturing, process 1\nmore"])
+def test_a_file_that_is_no_lock_is_kept(tmp_path: Path, text: str) -> None:
+    (tmp_path / "lock").write_text(text)
+    assert Lock.holder(tmp_path) == ""
+    with pytest.raises(FilesError, match="no lock"):
+        Lock(tmp_path, "capturing").__enter__()
+    assert (tmp_path / "lock").read_text() == text
+
+
+@needs_links
+def test_a_lock_that_is_a_pipe_does_not_hang(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "lock")
+    begun = time.monotonic()
+    assert Lock.holder(tmp_path) == ""
+    with pytest.raises(FilesError):
+        Lock(tmp_path, "capturing").__enter__()
+    assert time.monotonic() - begun < 1
+
+
+def test_looking_at_a_lock_writes_nothing(tmp_path: Path) -> None:
+    with Lock(tmp_path, "capturing"):
+        pass
+    (tmp_path / "lock").write_text("capturing, process 12")
+    assert Lock.holder(tmp_path) == ""
+    assert (tmp_path / "lock").read_text() == "capturing, process 12"
+    with Lock(tmp_path, "fitting a\nscene"), pytest.raises(BusyError, match="fitting a\nscene"):
+        Lock(tmp_path, "looking").__enter__()
+
+
+@needs_links
+def test_a_link_in_the_way_of_a_write_is_replaced_and_not_followed(tmp_path: Path) -> None:
+    theirs = tmp_path / "theirs"
+    theirs.write_text("mine")
+    for name in ("a.exr", "a.exr.part", "a.part"):
+        (tmp_path / name).symlink_to(theirs)
+    write_text(tmp_path / "a.exr", "new")
+    assert theirs.read_text() == "mine" and (tmp_path / "a.exr").read_text() == "new"
+    assert (tmp_path / "a.exr.part").is_symlink()
+
+
+def test_two_writers_do_not_meet(tmp_path: Path) -> None:
+    path = tmp_path / "a.exr"
+    with whole(path) as one, whole(path) as two:
+        assert one != two
+        one.write_text("one")
+        two.write_text("two")
+    assert path.read_text() == "one" and list(tmp_path.iterdir()) == [path]
+
+
+WRITE = """
+import sys, os
+from pathlib import Path
+from arto.core import marked
+from arto.core.files import whole
+path = Path(sys.argv[1])
+marked.scratch(path, "field")
+with whole(path) as partial:
+    partial.write_text("half")
+    os._exit(9)
+"""
+
+
+def test_what_a_killed_writer_leaves_goes_with_the_next_write(tmp_path: Path) -> None:
+    path = tmp_path / "a.exr"
+    theirs = [tmp_path / "a.exr.part", tmp_path / "a.exr.mine-1-0123456789abcdef.part"]
+    for there in theirs:
+        there.write_text("mine")
+    subprocess.run([sys.executable, "-c", WRITE, str(path)], check=False)
+    assert len(list(tmp_path.iterdir())) == 4
+    write_text(path, "new")
+    assert sorted(tmp_path.iterdir()) == sorted([path, *theirs])
+
+
+def test_a_name_is_short_enough_for_a_disk(tmp_path: Path) -> None:
+    name = "ä" * 120 + ".exr"
+    write_text(tmp_path / name, "x")
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+
+
+@needs_links
+def test_only_regular_files_of_a_size_are_read(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "zero").symlink_to("/dev/zero")
+    (tmp_path / "long").write_text("x" * 101)
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "good").write_text(json.dumps({"a": 1}))
+    begun = time.monotonic()
+    for name in ("pipe", "zero", "long", "folder", "none"):
+        with pytest.raises(OSError):
+            read_regular(tmp_path / name, 100, follow=name == "zero")
+    assert time.monotonic() - begun < 1
+    assert read_regular(tmp_path / "good", 100) == b'{"a": 1}'
