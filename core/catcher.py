@@ -1,9 +1,17 @@
 """The shadow catcher: what a scene does to the light of a ground that is not in the picture.
 
-A ground stands in for what was filmed. It is lit twice, with the scene's things on it and alone,
-and how much the first is of the second is what the things do to the footage: shadows make it less,
-mirrored light more. The things by themselves are a third picture. All three are of one light, so
-this is no matter of how they were lit.
+A ground stands in for the place that was filmed. It is captured twice: with the scene's things on
+it, and alone. The ratio of the two is what the things do to the footage: below 1 in their shadows,
+above 1 where they mirror light. The things alone are a third picture. All three are relit by the
+same light.
+
+Examples
+--------
+>>> ground = np.full((1, 1, 3), 0.5)
+>>> things = np.zeros((1, 1, 4))  # nothing stands in this pixel
+>>> caught = catch(0.4 * ground, ground, things)  # but a shadow falls there
+>>> [round(float(x), 3) for x in caught.over(np.full((1, 1, 3), 0.8))[0, 0]]
+[0.32, 0.32, 0.32]
 """
 
 from __future__ import annotations
@@ -13,25 +21,32 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-# Of a ground's median light: what is added on both sides of the ratio. A thousandth costs nothing,
-# a hundredth can be seen; without it, what is dark is all noise.
+# Added on both sides of the ratio, as a share of the ground's median light. Without it, dark places
+# are all noise. A thousandth costs nothing, a hundredth would be visible.
 FLOOR = 1e-3
-# No more than so many times as much light comes from a ground beside things as without them.
+# The most that things may multiply the light of the ground by.
 MOST = 10.0
-# The share of a pixel that is left of the ground from which on its shadow is believed in part, and
-# wholly: below, the outlines' noise is all there is.
+# A shadow is believed in part from the first share of visible ground in a pixel, and wholly from
+# the second. With less ground the ratio is the noise of outlines.
 HIDDEN, TRUSTED = 0.1, 0.5
-# Holes of less than this are the rounding of alphas, which are kept as half floats.
+# Smaller holes are the rounding of alphas, which are kept as half floats.
 ROUNDED = 4e-3
 
 
 @dataclass(frozen=True)
 class Caught:
-    """What things do to a picture that they are put into. All (H, W, ...), scene-linear.
+    """What things do to the footage that they are put into. All is scene-linear.
 
-    colour: (..., 3), the things by themselves, premultiplied by `alpha` (H, W), their coverage;
-    share: (..., 3), how much of what is behind is seen, in their shadows and under them; light:
-    (..., 3), what of light they add to the ground that is seen, or take from it, below 0.
+    Parameters
+    ----------
+    colour : (H, W, 3) float32
+        The things alone, premultiplied by `alpha`.
+    alpha : (H, W) float32
+        Their coverage.
+    share : (H, W, 3) float32
+        The factor for the footage: how much of it is seen beside the things and in their shadows.
+    light : (H, W, 3) float32
+        The light that the things add to the visible ground; negative in shadows.
     """
 
     colour: NDArray[np.float32]
@@ -41,17 +56,45 @@ class Caught:
 
     @property
     def plate(self) -> NDArray[np.float32]:
-        """(H, W, 4), premultiplied: as Cycles' own plate, in which shadows are grey."""
+        """(H, W, 4) float32, premultiplied: a plate like that of Cycles, with grey shadows in its
+        alpha.
+        """
         grey = np.clip(1 - self.share.mean(axis=-1), 0, 1)
         return np.dstack([self.colour, grey]).astype(np.float32)
 
     def over(self, footage: NDArray) -> NDArray[np.float32]:
-        """The things in the footage (H, W, 3), as Cycles' shadow catcher pass multiplies it."""
+        """Put the things into footage, as Cycles' shadow catcher pass does: by multiplication.
+
+        Parameters
+        ----------
+        footage : (H, W, 3) float
+            Scene-linear.
+
+        Returns
+        -------
+        (H, W, 3) float32
+        """
         return (self.colour + self.share * footage).astype(np.float32)
 
     def added_to(self, footage: NDArray) -> NDArray[np.float32]:
-        """The things in the footage (H, W, 3), their shadows as the light that they take from the
-        ground as it was modelled: right where footage and ground are alike (Debevec 1998)."""
+        """Put the things into footage by adding the light that they give to the ground, or take
+        from it.
+
+        This is right where the footage looks like the modelled ground.
+
+        Parameters
+        ----------
+        footage : (H, W, 3) float
+            Scene-linear.
+
+        Returns
+        -------
+        (H, W, 3) float32
+
+        Source
+        ------
+        Debevec 1998, "Rendering synthetic objects into real scenes", differential rendering.
+        """
         seen = (1 - self.alpha)[..., None]
         return np.maximum(self.colour + seen * footage + self.light, 0).astype(np.float32)
 
@@ -63,23 +106,46 @@ def catch(
     there: NDArray | None = None,
     held: NDArray | float = 0.0,
 ) -> Caught:
-    """How things and their shadows go into footage.
+    """Compute how things and their shadows go into footage.
 
-    whole: (H, W, 3), ground and things; ground: (H, W, 3), the ground alone; things: (H, W, 4),
-    these alone, where the ground does not hide them. All premultiplied, and without noise, or the
-    ratio has all of it. there: (H, W), how much of a pixel the ground covers by itself (default:
-    all); held: (H, W), how much is cut out before the ground, see `held_out`.
+    The pictures must be free of noise, because their ratio has all of it.
+
+    Parameters
+    ----------
+    whole : (H, W, 3) float
+        Ground and things, premultiplied, scene-linear.
+    ground : (H, W, 3) float
+        The ground alone.
+    things : (H, W, 4) float
+        The things alone, where the ground does not hide them.
+    there : (H, W) float, optional
+        The coverage of the ground by itself; by default 1.
+    held : (H, W) float
+        The holes in front of the ground, see `held_out`.
+
+    Returns
+    -------
+    Caught
     """
     return catch_seen(*of_ground(whole, ground, things, held), things, there, held)
 
 
 def held_out(whole: NDArray, ground: NDArray, things: NDArray) -> NDArray[np.float32]:
-    """How much of a pixel is cut out before the ground by what holds out, from the alphas of the
-    three takes, (H, W) each -> (H, W).
+    """Compute the holes that holdout objects cut into the picture in front of the ground.
 
-    The ground is alone without what holds out, so that all of it is there; with everything in the
-    picture, what is missing of it is the holes. For a scene that has such things: where coverage is
-    a matter of chance, what the three of them differ by is noise.
+    The ground alone is captured without these objects, so it is complete. In the picture of
+    everything, the missing part of the ground is the holes. This is meant for scenes with such
+    objects: in other scenes the three alphas differ by noise.
+
+    Parameters
+    ----------
+    whole, ground, things : (H, W) float
+        The alphas of the three takes.
+
+    Returns
+    -------
+    (H, W) float32
+        The share of a pixel that is cut out.
     """
     left = 1 - things.astype(np.float64)
     seen = np.divide(whole - things, ground, out=left.copy(), where=ground > 0)
@@ -90,12 +156,23 @@ def held_out(whole: NDArray, ground: NDArray, things: NDArray) -> NDArray[np.flo
 def of_ground(
     whole: NDArray, ground: NDArray, things: NDArray, held: NDArray | float = 0.0
 ) -> tuple[NDArray, NDArray]:
-    """What is seen of the ground beside things, and what would be without their shadows, (H, W, 3)
-    each, premultiplied by what the things, and holes, leave.
+    """Compute the visible part of the ground, with and without the shadows of things.
 
-    A denoiser is given these, not the whole and the ground: it lets what is bright glow over its
-    outline, and beside a thing that would be light on the ground. In these two the outline is the
-    same, and what glows of it is the same share of both.
+    These two pictures are denoised in place of the whole and the ground. A denoiser lets a bright
+    thing glow over its outline, which would be light on the ground. These two have the same
+    outlines, so a glow has the same share in both.
+
+    Parameters
+    ----------
+    whole, ground : (H, W, 3) float
+        As for `catch`.
+    things : (H, W, 4) float
+    held : (H, W) float
+
+    Returns
+    -------
+    left, bare : (H, W, 3) float
+        With and without shadows, premultiplied by what things and holes leave visible.
     """
     return whole - things[..., :3], (1 - things[..., 3] - held)[..., None] * ground
 
@@ -107,7 +184,20 @@ def catch_seen(
     there: NDArray | None = None,
     held: NDArray | float = 0.0,
 ) -> Caught:
-    """As `catch`, of what `of_ground` gives: what is seen of the ground, and without shadows."""
+    """Compute the same as `catch` from the pictures that `of_ground` gives.
+
+    Parameters
+    ----------
+    left, bare : (H, W, 3) float
+        The visible ground with shadows and without.
+    things : (H, W, 4) float
+    there : (H, W) float, optional
+    held : (H, W) float
+
+    Returns
+    -------
+    Caught
+    """
     colour, alpha = things[..., :3], things[..., 3]
     seen = (1 - alpha - held)[..., None]
     floor = FLOOR * _median(bare, seen[..., 0], there)
@@ -122,7 +212,7 @@ def catch_seen(
 
 
 def _median(bare: NDArray, seen: NDArray, there: NDArray | None) -> float:
-    """The median light of the ground where it is seen; as good as nothing of a black one."""
+    """The median light of the visible ground; a tiny number for a black ground."""
     grey = bare.mean(axis=-1)
     known = (grey > 0) & (seen > TRUSTED)
     if there is not None:
@@ -131,11 +221,25 @@ def _median(bare: NDArray, seen: NDArray, there: NDArray | None) -> float:
 
 
 def spread(values: NDArray, weights: NDArray) -> NDArray[np.float32]:
-    """Fill values (H, W, C) in where they are not known from what is known around, smoothly.
+    """Fill in unknown values smoothly from the known values around them.
 
-    weights: (H, W, 1), from 0, not known, to 1, kept as it is. Sums over ever larger squares say
-    what is there on the whole; each finer level keeps what it knows. Where nothing is known at all,
-    1.
+    Sums over ever larger squares give coarse values everywhere; each finer level keeps what it
+    knows (a pull-push pyramid).
+
+    Parameters
+    ----------
+    values : (H, W, C) float
+    weights : (H, W, 1) float
+        From 0, unknown, to 1, kept as it is.
+
+    Returns
+    -------
+    (H, W, C) float32
+        1 where nothing is known at all.
+
+    Source
+    ------
+    Gortler et al. 1996, "The Lumigraph", pull-push.
     """
     weights = weights.astype(np.float64)
     if (weights == 1).all():
@@ -143,7 +247,7 @@ def spread(values: NDArray, weights: NDArray) -> NDArray[np.float32]:
     levels = [(np.where(weights > 0, values * weights, 0), weights)]
     while levels[-1][1].shape[0] > 1 or levels[-1][1].shape[1] > 1:
         sums, weights = (_halved(part) for part in levels[-1])
-        # four that are known weigh no more than one: else far squares would pull at near ones
+        # four known pixels weigh as much as one, so that far squares do not outweigh near ones
         scale = np.minimum(weights, 1) / np.maximum(weights, 1e-30)
         levels.append((sums * scale, weights * scale))
     sums, weights = levels.pop()

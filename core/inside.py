@@ -1,6 +1,12 @@
 """A look inside a field: where the light of a pixel comes from, patch by patch (paper, figure 3).
 
-And the hemicube unfolded: a picture of what is around, in which a pixel's supports can be drawn.
+It also unfolds the hemicube into a picture in which the supports of a pixel can be drawn.
+
+Examples
+--------
+>>> around, patch, u, v = unfolded(Hemicube(patches=1), 2)
+>>> patch[:, ::2].tolist()  # top; left, right; bottom: rows of two pixels a face
+[[-1, 0...
 """
 
 from __future__ import annotations
@@ -19,8 +25,8 @@ from .light.layers import part_of
 from .light.light import PatchLight
 from .supports import BOX, LINEAR
 
-# Where the faces are in the unfolded hemicube, in faces from its left and top; each is seen from
-# inside, back in the middle, as the camera of an upright hemicube looks at it.
+# The place of each face in the unfolded hemicube, in faces from its left and top. Faces are seen
+# from inside. The back is in the middle, as the camera of an upright hemicube sees it.
 _CROSS = {
     "top": (1, 0), "left": (0, 1), "back": (1, 1), "right": (2, 1), "front": (3, 1),
     "bottom": (1, 2),
@@ -29,8 +35,20 @@ _CROSS = {
 
 @dataclass(frozen=True)
 class Part:
-    """What a patch gives to a pixel. reflects: R, (3,); light: R <S, L>, (3,); support: the name
-    of its model; box: (u0, u1, v0, v1), where most of it comes from, None for all of the patch."""
+    """The light that a patch gives to a pixel.
+
+    Parameters
+    ----------
+    patch : int
+    support : str
+        The name of the support model.
+    reflects : (3,) float32
+        R, the reflection coefficient.
+    light : (3,) float32
+        R <S, L>, scene-linear.
+    box : tuple of 4 float or None
+        u0, u1, v0, v1: where most of the light comes from; None for the whole patch.
+    """
 
     patch: int
     support: str
@@ -40,10 +58,27 @@ class Part:
 
 
 def parts_at(field: Field, light: PatchLight, x: int, y: int) -> list[Part]:
-    """What each patch gives to the pixel x, y (from the left and the top), the most first.
+    """Find the light that each patch gives to a pixel.
 
-    What was too small to be an entry is in none. They sum to the pixel without its rest and the
-    scene's own lamps. Raises FieldError outside the captured picture.
+    The parts sum to the pixel, without its rest (what was too small to be an entry) and without the
+    scene's own lamps.
+
+    Parameters
+    ----------
+    field : Field
+    light : PatchLight
+    x, y : int
+        The pixel, from the left and from the top.
+
+    Returns
+    -------
+    list of Part
+        The brightest first.
+
+    Raises
+    ------
+    FieldError
+        The pixel was not captured.
     """
     for tile in field.tiles:
         r = tile.region
@@ -78,7 +113,7 @@ def _box_of(support: str, parameters: NDArray) -> tuple[float, float, float, flo
         u0, u1, v0, v1 = (float(p) for p in parameters)
         return u0, u1, v0, v1
     if support == LINEAR.name:
-        # only its middle is known: it is drawn as a mark
+        # the model knows the middle alone, which is drawn as a mark
         u, v = (float(p) for p in parameters)
         return max(u - 0.06, 0), min(u + 0.06, 1), max(v - 0.06, 0), min(v + 0.06, 1)
     return None
@@ -91,10 +126,21 @@ def shares_at(
     y: int,
     parts: Mapping[str, NDArray],
 ) -> dict[str, float]:
-    """How much of a pixel's light each part of an environment gives, of all parts' light.
+    """Compute the share of each part of an environment in a pixel's light.
 
-    parts: shares (H, W) of the environment by name, that sum to 1, see `layers`. -> by name, the
-    most first; they sum to 1 unless no light comes at all.
+    Parameters
+    ----------
+    field : Field
+    environment : Environment
+    x, y : int
+        The pixel, from the left and from the top.
+    parts : dict of str to (H, W) float
+        The parts by name, as shares of each texel that sum to 1 (`light.layers`).
+
+    Returns
+    -------
+    dict of str to float
+        The largest first. They sum to 1, or are 0 where the pixel gets no light.
     """
     found = {}
     for name, share in parts.items():
@@ -108,10 +154,22 @@ def shares_at(
 
 
 def unfolded(hemicube: Hemicube, side: int) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """The hemicube laid out as a cross of faces, `side` pixels each.
+    """Lay the hemicube out as a cross of faces.
 
-    -> directions (3 side, 4 side, 3), patches (-1 where none is), u and v on them; rows run
-    top-down.
+    Parameters
+    ----------
+    hemicube : Hemicube
+    side : int
+        Pixels along the side of a face.
+
+    Returns
+    -------
+    directions : (3 side, 4 side, 3) float64
+        In the world; 0 beside the cross. Rows run top-down.
+    patch : (3 side, 4 side) int
+        The number of the patch, or -1.
+    u, v : (3 side, 4 side) float
+        Patch coordinates.
     """
     height, width = 3 * side, 4 * side
     around = np.zeros((height, width, 3))
@@ -140,15 +198,34 @@ def drawn(
     side: int = 192,
     show: float = 0.7,
 ) -> NDArray[np.float32]:
-    """The unfolded hemicube with an environment on it and the parts of a pixel: the paper's figure
-    3 -> (3 side, 4 side, 4), scene-linear.
+    """Draw the unfolded hemicube with an environment on it and the parts of a pixel.
 
-    A patch is as bright as it gives light to the pixel, its support is framed in orange, and the
-    seams of the patches are dark. show: how dark the rest is, from 0 to 1.
+    The brightness of a patch is the light that it gives to the pixel. Supports are framed in
+    orange, and the seams between patches are dark.
+
+    Parameters
+    ----------
+    hemicube : Hemicube
+    environment : Environment
+    parts : list of Part
+        As `parts_at` gives them.
+    side : int
+        Pixels along the side of a face.
+    show : float
+        How dark a patch without light is drawn, 0 to 1.
+
+    Returns
+    -------
+    (3 side, 4 side, 4) float32
+        Scene-linear, transparent beside the cross.
+
+    Source
+    ------
+    Paper, figure 3.
     """
     around, patch, u, v = unfolded(hemicube, side)
     light = environment.at(around)
-    # a display shows 1 at most; what is brighter than nearly all is white
+    # a display shows 1 at most: the brightest 3 in 100 are white
     light = light / max(float(np.percentile(light.max(axis=-1), 97)), 1e-9)
     given = np.zeros(len(hemicube))
     for part in parts:

@@ -1,8 +1,16 @@
 """Many lights at once: the sum over patches as a product of matrices.
 
-What a patch's entry gives is linear in a few numbers of the light there (its mean, and its slopes
-for models whose average is a plane). So for many lights the entries of a block of pixels are
-unpacked once, as a matrix in which what is no entry is 0, and multiplied by what the lights are.
+The light of an entry is linear in a few numbers of the environment on its patch: the mean, and the
+slopes for models whose average is a plane. So for many lights the entries of a block of pixels are
+unpacked once, into a matrix that is 0 where a pixel has no entry. This matrix is multiplied by the
+numbers of all lights.
+
+Examples
+--------
+>>> entries = np.array([[0.5, 0.0], [0.2, 0.8]])  # (pixels, patches)
+>>> radiance = np.array([[1.0, 2.0], [0.0, 1.0]])  # (patches, lights)
+>>> (entries @ radiance).round(3).tolist()
+[[0.5, 1.0], [0.2, 1.2]]
 """
 
 from __future__ import annotations
@@ -16,19 +24,25 @@ from .errors import FieldError
 from .field.tile import Model, Tile
 from .light.light import PatchLight
 
-# Of the unpacked entries, bytes at a time: a few patches of a block.
+# Bytes of entries that are unpacked at a time: a few patches of a block.
 ROOM = 1 << 26
-# Pixels that are multiplied at a time: what is in the cache is quicker.
+# Pixels that are multiplied at a time, so that they fit the cache.
 COLUMNS = 4096
 
 
 class Lights:
-    """Some lights (L) on a tile's patches, as matrices."""
+    """L lights on the patches of a tile, as matrices.
+
+    Parameters
+    ----------
+    tile : Tile
+    lights : sequence of PatchLight
+    """
 
     def __init__(self, tile: Tile, lights: Sequence[PatchLight]) -> None:
         self.tile, self.count = tile, len(lights)
         self._lights = lights
-        # by model: (K, 1 + p, 3, L), what its parameters are multiplied by; None for no plane
+        # by model: (K, 1 + p, 3, L), the factors of its parameters; None where it has no plane
         self._of = {model.support.code: self._planes(model) for model in tile.models}
         weights = tile.rest_weights
         self._rest: NDArray[np.float32] | None = None
@@ -50,15 +64,36 @@ class Lights:
         return out
 
     def has(self, model: Model) -> bool:
-        """Whether a model's entries can be added by `add`."""
+        """Say whether `add` can add up the entries of a model.
+
+        Parameters
+        ----------
+        model : Model
+
+        Returns
+        -------
+        bool
+        """
         return self._of[model.support.code] is not None
 
     def add(
         self, total: NDArray[np.float32], model: Model, block: int, room: NDArray[np.float32]
     ) -> None:
-        """Add a model's entries in a block to (3, L, n), in units of the tile's `ones`.
+        """Add the light of a model's entries in a block.
 
-        room: `ROOM` bytes to work in.
+        Parameters
+        ----------
+        total : (3, L, n) float32
+            The sums so far, in units of the tile's `ones`; changed in place.
+        model : Model
+        block : int
+        room : (`ROOM` / 4,) float32
+            Memory to work in.
+
+        Raises
+        ------
+        FieldError
+            The counts of the tile contradict each other.
         """
         of = self._of[model.support.code]
         assert of is not None
@@ -92,8 +127,18 @@ class Lights:
                     total[c][:, these] += matrix[c] @ dense.reshape(-1, row)[:, these]
 
     def rest(self, pixels: slice) -> NDArray[np.float32] | None:
-        """(3, L, n): the light of what was too small to be entries, see `Tile.rest`; None where
-        nothing was."""
+        """Compute the light of what was too small to be an entry, see `Tile.rest`.
+
+        Parameters
+        ----------
+        pixels : slice
+            Pixels of the tile, row by row.
+
+        Returns
+        -------
+        (3, L, n) float32 or None
+            None where the tile has no rest.
+        """
         if self._rest is None:
             return None
         packed = self.tile.rest_patches[:, pixels]

@@ -1,8 +1,17 @@
 """Previews: what a field shows in a light, at the size that there is time for.
 
-A field has proxies at a half, a quarter and an eighth (see `proxy`). Here they are opened when they
-are asked for, and how long each took is kept, so that who drags a slider gets the largest that is
-quick enough.
+A field has proxies at a half, a quarter and an eighth of its size (`field.proxy`). A preview opens
+them when they are first asked for and remembers how long each takes. So an artist who drags a
+slider gets the largest picture that is quick enough.
+
+Examples
+--------
+>>> class Lamps:  # as much of a field as `own_light` asks for
+...     own_layers = ["own_Key"]
+...     def layer(self, name):
+...         return np.full((1, 1, 3), {"own": 1.0, "own_Key": 0.4}[name], np.float32)
+>>> [round(float(x), 3) for x in own_light(Lamps(), gains={"Key": 0.5})[0, 0]]
+[0.8, 0.8, 0.8]
 """
 
 from __future__ import annotations
@@ -21,15 +30,20 @@ from .hemicube import Hemicube
 from .light.light import PatchLight
 from .relight import relights
 
-# Seconds of a pixel and patch, until one was measured.
+# Seconds for a pixel and a patch, until a picture was timed.
 _GUESS = 2e-9
 
 
 class Preview:
     """The fields of a shot, whole and as proxies.
 
-    takes: one field, or the three of a shot with shadow catchers (of everything, of the catchers,
-    of the things, see `catcher`); holds_out: whether anything cuts holes into the picture.
+    Parameters
+    ----------
+    takes : sequence of Field
+        One field, or the three of a shot with shadow catchers: of everything, of the catchers, of
+        the things (`catcher`).
+    holds_out : bool
+        Whether an object cuts holes into the picture.
     """
 
     def __init__(self, takes: Sequence[Field], holds_out: bool = False) -> None:
@@ -42,21 +56,57 @@ class Preview:
 
     @property
     def hemicube(self) -> Hemicube:
+        """The hemicube of the fields."""
         return self.takes[0].hemicube
 
     def level(self, factor: int) -> tuple[Field, ...]:
-        """The fields at 1 / factor of the size. Raises FieldError."""
+        """Open the fields at a smaller size.
+
+        Parameters
+        ----------
+        factor : int
+            1, 2, 4 or 8: how many times smaller.
+
+        Returns
+        -------
+        tuple of Field
+
+        Raises
+        ------
+        FieldError
+            A field has no proxy of this factor.
+        """
         if factor not in self._levels:
             self._levels[factor] = tuple(merged(t.proxy(factor)) for t in self.takes)
         return self._levels[factor]
 
     def shape(self, factor: int) -> tuple[int, int]:
-        """Height and width of the picture at 1 / factor of the size."""
+        """Give the size of the picture.
+
+        Parameters
+        ----------
+        factor : int
+            How many times smaller.
+
+        Returns
+        -------
+        tuple of int
+            (height, width).
+        """
         return self.level(factor)[0].shape
 
     def factor_for(self, seconds: float) -> int:
-        """The least factor, which is the largest picture, that takes no longer than so many
-        seconds, as far as is known; the greatest where none does."""
+        """Find the largest picture that is expected to take no longer than a time.
+
+        Parameters
+        ----------
+        seconds : float
+
+        Returns
+        -------
+        int
+            Its factor; the greatest one, of the smallest picture, where every picture takes longer.
+        """
         height, width = self.takes[0].shape
         whole = height * width * len(self.hemicube) * len(self.takes) * _GUESS
         for factor in self.factors:
@@ -71,10 +121,23 @@ class Preview:
         own: float = 1.0,
         gains: Mapping[str, float] | None = None,
     ) -> NDArray[np.float32]:
-        """The picture in a light -> (h, w, 4), scene-linear, premultiplied; of a shot with shadow
-        catchers, as its plate is, with their shadows in its alpha.
+        """Compute the picture in a light.
 
-        own, gains: of the scene's own lamps, see `own_light`.
+        Parameters
+        ----------
+        light : PatchLight
+        factor : int
+            How many times smaller.
+        own : float
+            The factor for the light of the scene's own lamps.
+        gains : dict of str to float, optional
+            Factors for the light groups of these lamps, by name, see `own_light`.
+
+        Returns
+        -------
+        (h, w, 4) float32
+            Scene-linear, premultiplied. Of a shot with shadow catchers the shadows are in the
+            alpha, as in its plate.
         """
         begun = time.perf_counter()
         found = []
@@ -92,7 +155,7 @@ class Preview:
             held = held_out(*alphas) if self.holds_out else 0.0
             out = catch(whole[..., :3], alone[..., :3], apart, alone[..., 3], held).plate
         took = time.perf_counter() - begun
-        # what is nearest to the last ones: a machine is busy now and idle then
+        # smoothed, because a machine is busy at one time and idle at another
         self._seconds[factor] = took + 0.5 * (self._seconds.get(factor, took) - took)
         return out
 
@@ -100,14 +163,25 @@ class Preview:
 def own_light(
     field: Field, own: float = 1.0, gains: Mapping[str, float] | None = None
 ) -> NDArray[np.float32]:
-    """The light of a scene's own lamps and of what emits in it -> (H, W, 3).
+    """Compute the light of the scene's own lamps and of what emits in it.
 
-    own: how much of it; gains: by the name of a light group, how much of that group (default 1).
+    Parameters
+    ----------
+    field : Field
+    own : float
+        The factor for all of it.
+    gains : dict of str to float, optional
+        The factor for each light group, by name; 1 for the others.
+
+    Returns
+    -------
+    (H, W, 3) float32
+        Scene-linear radiance.
     """
     out = field.layer("own")
     for name in field.own_layers:
         gain = (gains or {}).get(name.removeprefix("own_"), 1.0)
         if gain != 1.0:
             out = out + np.float32(gain - 1.0) * field.layer(name)
-    # what is left where a group is switched off is nothing, but for rounding
+    # a group that is switched off leaves 0 or, by rounding, a little less
     return np.float32(own) * np.maximum(out, 0)

@@ -1,4 +1,11 @@
-"""Relighting: I(p) = sum over patches k of R(p, k) <S(p, k), L_k> (paper 3 and 6)."""
+"""Relighting: I(p) = sum over patches k of R(p, k) <S(p, k), L_k> (paper 3 and 6).
+
+Examples
+--------
+>>> plate = np.array([[[0.2, 0.2, 0.2, 0.5]]])  # premultiplied, half covered
+>>> over(plate, np.full((1, 1, 3), 0.6)).round(6).tolist()
+[[[0.5, 0.5, 0.5, 1.0]]]
+"""
 
 from __future__ import annotations
 
@@ -16,12 +23,21 @@ from .light.light import PatchLight
 from .lights import ROOM, Lights
 from .region import Region
 
-# Lights that are added up at a time by who has many, and the bytes that their pictures may take.
+# The most lights that are added up at a time, and the most bytes that their pictures take.
 TOGETHER, PICTURES = 24, 1 << 30
 
 
 def together(field: Field) -> int:
-    """How many lights are best added up at a time: more would take too much memory."""
+    """Choose how many lights are added up at a time, so that their pictures fit the memory.
+
+    Parameters
+    ----------
+    field : Field
+
+    Returns
+    -------
+    int
+    """
     height, width = field.shape
     return max(1, min(TOGETHER, PICTURES // (16 * height * width)))
 
@@ -29,11 +45,31 @@ def together(field: Field) -> int:
 def relight(
     field: Field, light: PatchLight, own: float = 1.0, region: Region | None = None
 ) -> NDArray[np.float32]:
-    """The picture under `light`.
+    """Compute the picture of a field under a light. The picture is linear in the light.
 
-    own: how much of the scene's own lamps to add; region: the part of the picture that is wanted,
-    and read (default: all of it). -> (H, W, 4) float32 of the picture or the region, scene-linear
-    radiance with premultiplied alpha; transparent outside the captured region. Linear in the light.
+    Parameters
+    ----------
+    field : Field
+    light : PatchLight
+    own : float
+        The factor for the light of the scene's own lamps.
+    region : Region, optional
+        The part of the picture that is computed and read; by default all of it.
+
+    Returns
+    -------
+    (H, W, 4) float32
+        The picture or the region: scene-linear radiance with premultiplied alpha, transparent where
+        nothing was captured.
+
+    Raises
+    ------
+    FieldError
+        The field is damaged.
+
+    Source
+    ------
+    Paper 3, equation of the reflectance field; paper 6.
     """
     return relights(field, [light], own, region)[0]
 
@@ -45,10 +81,30 @@ def relights(
     region: Region | None = None,
     cut: bool = False,
 ) -> list[NDArray[np.float32]]:
-    """The pictures under some lights, see `relight`: the field is read and unpacked once for all.
+    """Compute the pictures of a field under several lights. The field is read and unpacked once.
 
-    cut: no patch gives less than nothing, where a plane laid through a bright spot undershoots: for
-    what is divided by. What is in memory is the pictures; `together` are quick.
+    Parameters
+    ----------
+    field : Field
+    lights : sequence of PatchLight
+        `together` says for how many lights the pictures fit the memory.
+    own : float
+        The factor for the light of the scene's own lamps.
+    region : Region, optional
+        The part of the picture that is computed and read; by default all of it.
+    cut : bool
+        Whether the light of a patch is cut at 0. A plane fitted to a bright spot undershoots beside
+        it, which would hurt where pictures are divided by each other.
+
+    Returns
+    -------
+    list of (H, W, 4) float32
+        As `relight` gives.
+
+    Raises
+    ------
+    FieldError
+        The field is damaged.
     """
     if not lights:
         return []
@@ -78,7 +134,7 @@ def _light(
     tile: Tile, lights: Sequence[PatchLight], asked: slice, cut: bool
 ) -> NDArray[np.float32]:
     """The light of all patches on some pixels of a tile -> (L, n, 3)."""
-    tile.open()  # which may fail: here, and not in the threads
+    tile.open()  # here, so that an error is raised before the threads start
     blocks = [i for i, b in enumerate(tile.blocks) if b.stop > asked.start and b.start < asked.stop]
     out = np.empty((len(lights), asked.stop - asked.start, 3), np.float32)
     threads = os.cpu_count() or 1
@@ -88,7 +144,7 @@ def _light(
         to = slice(inside.start - asked.start, inside.stop - asked.start)
         out[i, to] = light[inside.start - where.start : inside.stop - where.start]
 
-    # what is cut is no sum of products
+    # a matrix product cannot cut the light of each patch at 0
     add = _one_by_one if len(lights) == 1 or cut else _together
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(add(tile, lights, cut, threads, put), blocks))
@@ -101,7 +157,7 @@ Put = Callable[[int, slice, NDArray[np.float32]], None]
 def _one_by_one(
     tile: Tile, lights: Sequence[PatchLight], cut: bool, threads: int, put: Put
 ) -> Callable[[int], None]:
-    """What adds up a block for each light by itself."""
+    """Make the function that adds up a block for each light by itself."""
     # what all blocks share is worked out before the threads start
     tables = [_rest_tables(tile, light) for light in lights]
     rooms = [_Room(cut) for _ in range(threads)]
@@ -126,7 +182,7 @@ def _one_by_one(
 def _together(
     tile: Tile, lights: Sequence[PatchLight], cut: bool, threads: int, put: Put
 ) -> Callable[[int], None]:
-    """What adds up a block for all lights, see `lights`."""
+    """Make the function that adds up a block for all lights at once, as matrices (`lights`)."""
     every = Lights(tile, lights)
     rooms = [_Room(cut) for _ in range(threads)]
 
@@ -155,8 +211,10 @@ def _together(
 
 
 class _Room:
-    """Memory that a thread works in: making it anew for each patch would take longer than the sum,
-    and hold up the other threads."""
+    """The memory that a thread works in.
+
+    To allocate it anew for each patch would take longer than the sum and hold up the other threads.
+    """
 
     def __init__(self, cut: bool) -> None:
         self._parts: dict[str, NDArray[np.float32]] = {}
@@ -196,8 +254,8 @@ class _Room:
                 np.maximum(averages, 0, out=averages)
             values *= averages
         pixels = model.pixels(block, k)
-        # as `total[pixels] += values.T`, but that a pixel is moved as one number of 16 bytes; clip
-        # because that is numpy's way without a copy
+        # the same as `total[pixels] += values.T`, but each pixel moves as one number of 16 bytes;
+        # with mode="clip" numpy makes no copy
         sums = self._part("sums", n, 4)
         ones, places = sums.view(np.complex128)[:, 0], total.view(np.complex128)[:, 0]
         places.take(pixels, out=ones, mode="clip")
@@ -220,8 +278,11 @@ def _rest_tables(tile: Tile, light: PatchLight) -> NDArray[np.float32] | None:
 
 
 def _rest_light(tile: Tile, tables: NDArray[np.float32], where: slice) -> NDArray[np.float32]:
-    """(n, 3): the rest's R times the mean radiance of the patches that were dropped there, each
-    counting as much as was dropped of it in all the tile."""
+    """(n, 3): the light of the dropped entries, as the rest's R times a mean radiance.
+
+    The mean is over the patches that were dropped in a pixel. Each patch has the weight of all that
+    was dropped of it in the tile.
+    """
     total = np.zeros((where.stop - where.start, 4), np.float32)
     for table, patches in zip(tables, tile.rest_patches[:, where], strict=True):
         total += table.take(patches, axis=0)
@@ -231,7 +292,20 @@ def _rest_light(tile: Tile, tables: NDArray[np.float32], where: slice) -> NDArra
 
 
 def over(plate: NDArray, background: NDArray) -> NDArray[np.float32]:
-    """The plate (premultiplied RGBA) over an opaque background (H, W, 3) -> opaque RGBA."""
+    """Lay a plate over an opaque background.
+
+    Parameters
+    ----------
+    plate : (H, W, 4) float
+        Scene-linear, premultiplied.
+    background : (H, W, 3) float
+        Scene-linear.
+
+    Returns
+    -------
+    (H, W, 4) float32
+        Opaque.
+    """
     out = plate.astype(np.float32, copy=True)
     out[..., :3] += (1 - plate[..., 3:]) * background
     out[..., 3] = 1

@@ -1,7 +1,17 @@
-"""Whether a picture is what a few samples of the truth say, within their noise.
+"""Verification: whether a picture agrees with two noisy renders of the truth, within their noise.
 
-Two renders of other seeds are the truth with noise, and how they differ is how large that is.
-Compared are means over squares of pixels: noise falls with a square's side, an error does not.
+The mean of the two renders is the truth with noise, and their difference tells how large this
+noise is. Means over squares of pixels are compared: noise falls with the side of a square, and an
+error stays.
+
+Examples
+--------
+>>> noise = np.random.default_rng(0).normal(0, 0.05, (2, 64, 64, 3))
+>>> one, two = 0.5 + noise
+>>> verify(np.full((64, 64, 3), 0.5), one, two).share < 0.01
+True
+>>> verify(np.full((64, 64, 3), 0.6), one, two).share > 0.99
+True
 """
 
 from __future__ import annotations
@@ -11,18 +21,28 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-# Pixels a side, and how many standard errors a difference may be by chance.
+# Pixels along the side of a square, and how many standard errors count as chance.
 SIDE = 8
 CHANCE = 3.0
-# What is less off than this, of the light there, nobody sees.
+# A relative difference that nobody sees.
 TELLING = 0.02
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """error: mean relative difference of the picture from the truth over squares, noise included;
-    noise: what of it noise alone would be; share: of all squares, how many differ by more than
-    chance; off: (H, W), the relative difference beyond chance, pixel by pixel as its square."""
+    """How a picture compares with the truth.
+
+    Parameters
+    ----------
+    error : float
+        The mean relative difference over squares, noise included.
+    noise : float
+        The part of `error` that noise alone would cause.
+    share : float
+        The share of squares that differ by more than chance, 0 to 1.
+    off : (H, W) float32
+        The relative difference beyond chance; the pixels of a square have the same value.
+    """
 
     error: float
     noise: float
@@ -31,7 +51,7 @@ class Verdict:
 
     @property
     def line(self) -> str:
-        """In words."""
+        """The result in words."""
         if self.share < 0.01:
             return f"Agrees with a render within its noise ({self.noise:.1%})"
         return f"Differs by more than noise in {self.share:.0%} of the picture"
@@ -40,29 +60,42 @@ class Verdict:
 def verify(
     picture: NDArray, one: NDArray, two: NDArray, side: int = SIDE, own: float = 0.0
 ) -> Verdict:
-    """Hold a picture (H, W, 3) against two renders of it with independent noise.
+    """Compare a picture with two renders of it that have independent noise.
 
-    own: variance of the picture's own noise, in units of that of the two's mean: its capture is of
-    so many samples, and a denoiser leaves little of it. Scene-linear, premultiplied. What neither
-    has light in counts as alike.
+    Parameters
+    ----------
+    picture : (H, W, 3) float
+        Scene-linear, premultiplied.
+    one, two : (H, W, 3) float
+        The renders, from different seeds.
+    side : int
+        Pixels along the side of a square.
+    own : float
+        The variance of the picture's own noise, relative to the variance of the mean of both
+        renders. It depends on the capture's number of samples; a denoised picture has little.
+
+    Returns
+    -------
+    Verdict
+        Squares in which all three are dark count as alike.
     """
     truth = (one.astype(np.float64) + two) / 2
     half = (one.astype(np.float64) - two) / 2
     counts = _sums(np.ones(truth.shape[:2]), side)
     mean = _sums(truth, side) / counts[..., None]
     found = _sums(picture.astype(np.float64), side) / counts[..., None]
-    # of each pixel's mean the variance is the square of half the difference; of their mean in a
-    # square the sum of those over their number squared
+    # the variance of a pixel's mean is the square of half the difference; the variance of the mean
+    # of a square is the sum of these over the squared number of pixels
     deviation = np.sqrt(_sums(half**2, side)) / counts[..., None]
     floor = 0.01 * truth.mean() + 1e-12
     relative = np.abs(found - mean) / (mean + floor)
     chance = CHANCE * np.sqrt(1 + own) * deviation / (mean + floor)
-    # a square's own estimate of its noise is unsure: those around have as much
+    # the estimate of a single square is uncertain, and the others have about the same noise
     chance = np.maximum(chance, np.median(chance, axis=(0, 1)))
     beyond = np.maximum(relative - chance, 0).max(axis=-1)
     h, w = truth.shape[:2]
     off = np.repeat(np.repeat(beyond, side, 0), side, 1)[:h, :w].astype(np.float32)
-    # of a normal noise the mean size is sqrt(2 / pi) of its deviation
+    # the mean absolute value of normal noise is sqrt(2 / pi) times its deviation
     noise = float((deviation / (mean + floor)).mean() * np.sqrt(2 / np.pi))
     return Verdict(float(relative.mean()), noise, float((beyond > TELLING).mean()), off)
 
@@ -74,7 +107,19 @@ def _sums(image: NDArray, side: int) -> NDArray[np.float64]:
 
 
 def marked(picture: NDArray, verdict: Verdict) -> NDArray[np.float32]:
-    """The picture (H, W, 3 or 4), darker, and red where it is off -> (H, W, 4)."""
+    """Draw where a picture is off: the picture darker and grey, with red over it.
+
+    Parameters
+    ----------
+    picture : (H, W, 3) or (H, W, 4) float
+        Scene-linear.
+    verdict : Verdict
+
+    Returns
+    -------
+    (H, W, 4) float32
+        Opaque.
+    """
     grey = picture[..., :3].mean(axis=-1, keepdims=True) * 0.4
     red = np.clip(verdict.off * 4, 0, 1)[..., None]
     out = grey * (1 - red) + red * np.array([1.0, 0.05, 0.02])

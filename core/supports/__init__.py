@@ -1,4 +1,4 @@
-"""The support models, one a module, and what a field may be fitted with."""
+"""The support models, one a module, and what a field may be fitted with (paper 3 and 5)."""
 
 from __future__ import annotations
 

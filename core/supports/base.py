@@ -1,4 +1,11 @@
-"""What a support model is (paper 3: the evaluation of a support is a filter on the light)."""
+"""What a support model is: a filter on the light of one patch (paper 3).
+
+Examples
+--------
+>>> from arto.core.supports import SUPPORTS
+>>> {model.name: model.parameters for model in SUPPORTS.values()}["box"]
+('u0', 'u1', 'v0', 'v1')
+"""
 
 from __future__ import annotations
 
@@ -12,11 +19,19 @@ from ..light.light import PatchLight
 
 
 class Support(Protocol):
-    """A filter shape on one patch. Adding one is a module with such an object, and its line in
-    `supports.SUPPORTS`.
+    """A filter shape on one patch.
 
-    name; code: its number in the field's files, never used again for another; parameters: their
-    names, every one in [0, 1]; needs: the moments that identify it (indices of `MONOMIALS`).
+    To add a model, write a module with such an object and a line in `supports.SUPPORTS`.
+
+    Attributes
+    ----------
+    name : str
+    code : int
+        The model's number in the files of a field, never used again for another model.
+    parameters : tuple of str
+        The names of the p parameters; each is in [0, 1].
+    needs : tuple of int
+        The moments that identify the parameters, as indices into `patterns.MONOMIALS`.
     """
 
     name: str
@@ -25,16 +40,50 @@ class Support(Protocol):
     needs: tuple[int, ...]
 
     def fit(self, moments: Moments) -> NDArray:
-        """The parameters (n, p) of n pixels."""
+        """Compute the parameters of n pixels.
+
+        Parameters
+        ----------
+        moments : Moments
+            Of one patch and n pixels.
+
+        Returns
+        -------
+        (n, p) float
+        """
         ...
 
     def average(self, light: PatchLight, k: int, parameters: NDArray) -> NDArray:
-        """<S, L>: the light of patch k averaged over the supports (n, p) -> (n, 3) radiance."""
+        """Compute <S, L>: the light of a patch averaged over supports.
+
+        Parameters
+        ----------
+        light : PatchLight
+        k : int
+            The number of the patch.
+        parameters : (n, p) float
+
+        Returns
+        -------
+        (n, 3) float
+            Scene-linear radiance.
+        """
         ...
 
     def plane(
         self, light: PatchLight, k: int
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
-        """What `average` is where it is linear in the parameters: a constant (3,), and slopes
-        (3, p) along them. None where it is not."""
+        """Give `average` as a plane, for models whose average is linear in the parameters.
+
+        Parameters
+        ----------
+        light : PatchLight
+        k : int
+            The number of the patch.
+
+        Returns
+        -------
+        tuple or None
+            A constant (3,) and the slopes (3, p) along the parameters; None for other models.
+        """
         ...

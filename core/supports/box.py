@@ -1,8 +1,16 @@
-"""The box: an axis-aligned rectangle, uniform inside (paper 3 and 5), from its moments.
+"""The box: an axis-aligned rectangle, uniform inside, computed from its moments (paper 3 and 5).
 
-A uniform box of centre mu and half width a has E[u] = mu and E[u^2] = mu^2 + a^2 / 3, where its
-patch is so small that area and solid angle are one; `measure.box_of` finds the box on any. The
-paper's search finds the same minimum where its patterns can see it.
+A uniform box of centre mu and half width a has E[u] = mu and E[u^2] = mu^2 + a^2 / 3, on a patch
+so small that its density is constant. `measure.box_of` finds the box on any patch. The paper's
+search (`fit.search`) finds the same minimum where its patterns identify it.
+
+Examples
+--------
+>>> mean, square = 0.5, 0.5**2 + 0.1**2 / 3
+>>> values = np.array([[1.0], [mean], [square], [mean], [square], [mean * mean]])
+>>> small = (0.0, 0.01, 0.0, 0.01)  # a patch on which solid angle is as good as area
+>>> Box().fit(Moments(np.ones((1, 3)), values, small)).round(3).tolist()
+[[0.4, 0.6, 0.4, 0.6]]
 """
 
 from __future__ import annotations
@@ -17,6 +25,8 @@ from ..patterns import ONE, UU, VV, U, V
 
 
 class Box:
+    """The box model; parameters are its edges in patch coordinates."""
+
     name = "box"
     code = 3
     parameters: tuple[str, ...] = ("u0", "u1", "v0", "v1")

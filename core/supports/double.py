@@ -1,15 +1,24 @@
 """Two components in one patch: a uniform one (the base) and a narrow box (the coat).
 
-With share x of the light in the box, the deviation of the mean from the whole patch's is x times
-that of the box's mean, and the covariance of u and v is
+Let the box have the share x of the light. Then the mean deviates from the whole patch's mean by x
+times the deviation of the box, and the covariance of u and v is
 
     C = (1 - x) C_patch + x C_box + (1 - x) / x d_u d_v
 
-with d the deviations of the mean. A box has next to no covariance, so this is a quadratic equation
-in x (where area and solid angle are one, C_patch is 0 too, and x = 1 / (1 + C / (d_u d_v))); the
-box follows from what is left of the second moments, and its own covariance corrects x. A box on
-either middle line of the patch has d = 0 there: five numbers from four then, and the single box is
-what comes out (docs/identifiability.md).
+with the deviations d of the mean. The covariance of a box is nearly 0, so this is a quadratic
+equation in x. (On a patch so small that its density is constant, C_patch is 0 too, and x = 1 / (1
++ C / (d_u d_v)).) The box follows from the rest of the second moments, and its own covariance then
+corrects x.
+
+A box on a middle line of the patch has d = 0. The moments then give four numbers for five
+parameters, and the result is a single box (docs/identifiability.md).
+
+Examples
+--------
+>>> Double().parameters
+('share', 'u0', 'u1', 'v0', 'v1')
+>>> float(_share(np.array([0.02]), np.array([0.02]), 0.0)[0])  # 1 / (1 + C / (d_u d_v))
+0.5
 """
 
 from __future__ import annotations
@@ -29,6 +38,8 @@ _LEAST_DEVIATION = 1e-4
 
 
 class Double:
+    """The model of base and coat; parameters are the share and the edges of the box."""
+
     name = "double"
     code = 7
     parameters: tuple[str, ...] = ("share", "u0", "u1", "v0", "v1")

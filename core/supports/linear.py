@@ -1,7 +1,15 @@
-"""The linear projection: the light taken as a plane over the patch, seen at the mean place.
+"""The linear projection: the light as a plane over the patch, looked up at the mean place.
 
-A pixel is a sum of moments, so light that is a + b u + c v over the patch is met exactly with the
-first moments alone, however the support looks: unbiased, and best for broad reflection.
+A pixel is a sum of moments. So light of the form a + b u + c v is reproduced exactly by the first
+moments, whatever the shape of the support: unbiased, and best for broad reflection.
+
+Examples
+--------
+>>> from arto.core.hemicube import Hemicube
+>>> from arto.core.light.environment import Environment
+>>> light = PatchLight(Environment.uniform(2.0), Hemicube(patches=1))
+>>> Linear().average(light, 0, np.array([[0.3, 0.8]])).round(4).tolist()
+[[2.0, 2.0, 2.0]]
 """
 
 from __future__ import annotations
@@ -15,6 +23,8 @@ from ..patterns import ONE, U, V
 
 
 class Linear:
+    """The linear model; parameters are the mean place on the patch."""
+
     name = "linear"
     code = 2
     parameters: tuple[str, ...] = ("mean_u", "mean_v")

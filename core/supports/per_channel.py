@@ -1,6 +1,12 @@
-"""One support a channel: what dispersion and coloured coats need, at three times the parameters.
+"""One support a channel, for dispersion and coloured coats, at three times the parameters.
 
-The paper shares a support among the channels (section 5) and names this as the other way.
+The paper shares a support among the channels (section 5) and names this as the alternative.
+
+Examples
+--------
+>>> from arto.core.supports import PER_CHANNEL
+>>> PER_CHANNEL["linear"].parameters[:3], PER_CHANNEL["linear"].code
+(('mean_u_r', 'mean_v_r', 'mean_u_g'), 66)
 """
 
 from __future__ import annotations
@@ -17,7 +23,13 @@ CODE = 64
 
 
 class PerChannel:
-    """Another support model, fitted to each channel's own moments."""
+    """Another support model, fitted to the moments of each channel.
+
+    Parameters
+    ----------
+    base : Support
+        The other model.
+    """
 
     def __init__(self, base: Support) -> None:
         self.base = base

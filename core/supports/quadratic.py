@@ -1,7 +1,15 @@
-"""The quadratic projection: the light taken as a + b u + c u^2 + d v + e v^2 over the patch.
+"""The quadratic projection: the light as a + b u + c u^2 + d v + e v^2 over the patch.
 
-Like the linear one it is unbiased for such light, needs no shape of the support, and follows the
-light more closely; it also asks more of the moments, and can ring beside a sun.
+Like the linear projection it is unbiased for such light and needs no shape of the support. It
+follows the light more closely. In return it needs more moments, and can ring beside a sun.
+
+Examples
+--------
+>>> from arto.core.hemicube import Hemicube
+>>> from arto.core.light.environment import Environment
+>>> light = PatchLight(Environment.uniform(2.0), Hemicube(patches=1))
+>>> Quadratic().average(light, 0, np.array([[0.3, 0.1, 0.8, 0.7]])).round(3).tolist()
+[[2.0, 2.0, 2.0]]
 """
 
 from __future__ import annotations
@@ -15,6 +23,8 @@ from ..patterns import ONE, UU, VV, U, V
 
 
 class Quadratic:
+    """The quadratic model; parameters are the first two moments along u and along v."""
+
     name = "quadratic"
     code = 4
     parameters: tuple[str, ...] = ("mean_u", "square_u", "mean_v", "square_v")

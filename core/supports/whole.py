@@ -1,4 +1,13 @@
-"""The whole patch: every direction of it counts the same. This is the Light Stage (paper 8)."""
+"""The whole patch: every direction of it counts the same. This is the Light Stage (paper 8).
+
+Examples
+--------
+>>> from arto.core.hemicube import Hemicube
+>>> from arto.core.light.environment import Environment
+>>> light = PatchLight(Environment.uniform(2.0), Hemicube(patches=1))
+>>> Whole().average(light, 0, np.empty((1, 0))).round(3).tolist()
+[[2.0, 2.0, 2.0]]
+"""
 
 from __future__ import annotations
 
@@ -10,6 +19,8 @@ from ..light.light import PatchLight
 
 
 class Whole:
+    """The model without parameters."""
+
     name = "whole"
     code = 1
     parameters: tuple[str, ...] = ()

@@ -27,7 +27,6 @@ TO_COME = {
     "arto.core.capture.refine",
     "arto.core.capture.seed",
     "arto.core.capture.tile_data",
-    "arto.core.catcher",
     "arto.core.exr.layout",
     "arto.core.exr.reading",
     "arto.core.exr.window",
@@ -45,19 +44,6 @@ TO_COME = {
     "arto.core.fit.fit",
     "arto.core.fit.matte",
     "arto.core.fit.search",
-    "arto.core.inside",
-    "arto.core.lights",
-    "arto.core.preview",
-    "arto.core.relight",
-    "arto.core.supports.base",
-    "arto.core.supports.box",
-    "arto.core.supports.double",
-    "arto.core.supports.linear",
-    "arto.core.supports.per_channel",
-    "arto.core.supports.quadratic",
-    "arto.core.supports.tilted",
-    "arto.core.supports.whole",
-    "arto.core.verify",
 }
 MODULES = [
     ".".join(("arto", "core", *path.relative_to(CORE).with_suffix("").parts))
@@ -101,6 +87,8 @@ def _is_class(thing: Any) -> bool:
 def _parameters(thing: Any) -> set[str]:
     if dataclasses.is_dataclass(thing):
         return {f.name for f in dataclasses.fields(thing) if not f.name.startswith("_")}
+    if inspect.isclass(thing) and getattr(thing, "_is_protocol", False):
+        return set(thing.__annotations__)
     if inspect.isclass(thing) and thing.__init__ is object.__init__:
         return set()
     names = set(inspect.signature(thing).parameters) - {"self"}
