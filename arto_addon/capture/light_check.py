@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from ...core.capture.agreement import DIFFERENT, SUSPECTED, Agreement, agreement
+from ...core.capture.names import combined
 from ...core.hemicube import Hemicube
 from ...core.light.environment import Environment, directions, sample_directions
 from ...core.patterns import pattern_set
@@ -40,7 +41,7 @@ def check_light(on: Stage, hemicube: Hemicube) -> Steps:
     seed = on.scene.cycles.seed
     black, through = on.scene.world, on.scene.cycles.transparent_max_bounces
     with small(on, SAMPLES):
-        own = _combined((yield from parts_of(on, "looking at the scene's own light")))
+        own = combined((yield from parts_of(on, "looking at the scene's own light")))[..., :3]
         found = yield from _of_patches(on, hemicube, own, sampled=False)
         expected = []
         try:
@@ -51,7 +52,7 @@ def check_light(on: Stage, hemicube: Hemicube) -> Steps:
             for i in (1, 2):
                 on.scene.cycles.seed = seed + i
                 parts = yield from parts_of(on, "looking at the light of a white world")
-                expected.append(_combined(parts))
+                expected.append(combined(parts)[..., :3])
         finally:
             on.scene.world = black
             on.scene.cycles.seed = seed
@@ -84,12 +85,8 @@ def _of_patches(on: Stage, hemicube: Hemicube, own: np.ndarray, sampled: bool) -
         some = images[start : start + most]
         with planes.lit(on, hemicube, pattern_set("white"), some, sampled):
             parts = yield from parts_of(on, "looking at the light of the patches")
-        total = total + (_combined(parts) - own)
+        total = total + (combined(parts)[..., :3] - own)
     return total
-
-
-def _combined(parts: dict[str, np.ndarray]) -> np.ndarray:
-    return next(v for n, v in parts.items() if n == "Combined" or n.endswith(".Combined"))[..., :3]
 
 
 def _white(on: Stage, hemicube: Hemicube) -> bpy.types.World:

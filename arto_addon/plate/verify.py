@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core import exr
+from ...core.capture.names import combined
 from ...core.errors import SceneError
 from ...core.field.field import Field
 from ...core.verify import Verdict, marked, verify
@@ -57,7 +58,7 @@ def verify_plate(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps
             on.change("render.use_crop_to_border", False)
             text = f"rendering {SAMPLES} samples to compare with, {seed} of 2"
             parts = yield from parts_of(on, text, (seed - 1) / 2, 0.5)
-            renders.append(next(p for n, p in parts.items() if n.endswith("Combined")))
+            renders.append(combined(parts))
     if renders[0].shape[:2] != there.shape[:2]:
         raise SceneError("the plate has another size than a render now: press Relight first")
     for what, picture in (("the plate", there), ("the render", renders[0] + renders[1])):

@@ -9,7 +9,6 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.errors import FieldError
 from ...core.inside import drawn, parts_at, shares_at, unfolded
 from ...core.light.environment import Environment
 from ...core.light.lamps import split
@@ -67,8 +66,6 @@ def look(scene: bpy.types.Scene, x: int, y: int) -> Seen:
     environment = environment_of(scene)
     light = PatchLight(environment, field.hemicube)
     parts = parts_at(field, light, x, y)
-    if not 0 <= y < field.shape[0] or not 0 <= x < field.shape[1]:
-        raise FieldError("that is outside the picture")
     own = float(own_of(scene, field)[y, x].sum())
     if scene.arto.layers == "GROUPS" and scene.arto.groups:
         pieces = parts_of(scene, environment, field, check_world(scene, layer))

@@ -28,6 +28,7 @@ from ...core.field.field import HEADER as FIELD_HEADER
 from ...core.files import settle, write_text
 from ...core.regular import read_regular
 from ...core.shot import Shot, safe_name, short_hash
+from ..stage.takes import TAKES
 from . import home
 from . import scene_id as scene_ids
 from .shot import shot_of
@@ -278,8 +279,10 @@ def adopt(scene: bpy.types.Scene, view_layer: str, source: Path) -> Path:
 
 # What of a shot may be another's too.
 _KINDS: dict[str, marked.Kind] = {
-    "capture": "capture", "field": "field", "ground": "take", "things": "take",
-}  # fmt: skip
+    "capture": "capture",
+    "field": "field",
+    **dict.fromkeys(TAKES, "take"),
+}
 
 
 def _share(source: Path, target: Path) -> None:

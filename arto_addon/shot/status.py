@@ -47,12 +47,6 @@ def _place(scene: bpy.types.Scene, view_layer: str | None) -> Place | None:
         return None
 
 
-def is_of_another(scene: bpy.types.Scene, view_layer: str | None = None) -> bool:
-    """Whether what is there was captured for another file or scene."""
-    place = _place(scene, view_layer)
-    return bool(place and place.owner)
-
-
 def unfinished(folder: Path) -> list[str]:
     """The captures in a shot's folder that were stopped, the newest first: `2 of 7 tiles`."""
     found = []

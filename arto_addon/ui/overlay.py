@@ -25,8 +25,6 @@ from ..shot.shot import layer_of
 from ..world import kept
 from ..world.check import world_of
 
-# Of the scene's radius: how far away the patches are drawn.
-FAR = 2.0
 _handle: list[Any] = []
 _drawn: dict[str, Any] = {}
 # Who makes maps of the world while Live is off.
@@ -154,7 +152,7 @@ def _draw() -> None:
     if hemicube is None:
         return
     middle, radius = middle_of(scene)
-    size = FAR * radius
+    size = planes.VISIBLE * radius
     faces, edges = triangles(hemicube, middle, size)
     found = colours(scene, hemicube)
     gpu.state.depth_test_set("LESS_EQUAL")

@@ -16,6 +16,7 @@ from ..shoot import shoot_and_show
 from ..shot import paths
 from ..shot.shot import layer_of
 from ..stage.stage import picture_size
+from ..stage.takes import TAKES, WHOLE
 from ..work import Steps
 from ..world import controls
 from ..world.check import world_of
@@ -91,7 +92,7 @@ class ARTO_OT_delete_capture(Quick):
         if not (place.folder / "field").is_dir():
             raise SceneError("nothing would be left to relight with: fit the capture first")
         with Lock(place.folder, "deleting"):
-            for take in ("", "ground", "things"):
+            for take in (WHOLE, *TAKES):
                 folder = place.folder / take / "capture"
                 if folder.is_dir():
                     remove_capture(folder, place)

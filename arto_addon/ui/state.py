@@ -19,14 +19,15 @@ from ..shot import paths, status
 from ..shot.shot import layer_of, shot_of
 from ..stage.settings import samples_of
 from ..stage.stage import picture_region
+from ..stage.takes import TAKES
 from .words import tr
 
 # Seconds of a path on one core, until one was measured on this scene.
 _GUESS = 5e-6
 # And of all that is no path: starting, probing, fitting the last tile.
 OTHERS = 8.0
-# A shot with shadow catchers is captured so often, and takes so much longer than once.
-TAKES, THREE_TAKES = 3, 1.6
+# All takes of a shot with shadow catchers last so much longer than one.
+ALL_TAKES = 1.6
 
 
 @dataclass(frozen=True)
@@ -133,12 +134,12 @@ def price(scene: bpy.types.Scene, unfinished: bool = False) -> tuple[str, ...]:
         found = most(scene)
         pixels = picture_region(scene).pixels
         catches = any(thing.is_shadow_catcher for thing in scene.objects)
-        found = found.times(TAKES) if catches else found
+        found = found.times(1 + len(TAKES)) if catches else found
     except ArtoError as e:
         return (str(e),)
     samples = samples_of(scene)
     left, known = _seconds(scene, pixels * samples, unfinished)
-    left *= THREE_TAKES if catches else 1.0
+    left *= ALL_TAKES if catches else 1.0
     text = "About {time}, {samples} samples" if known else "Perhaps {time}, {samples} samples"
     first = tr(text, time=clock(left), samples=samples)
     disk, kept = size(found.disk), size(found.kept)

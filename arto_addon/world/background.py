@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core import exr
+from ...core.capture.names import combined
 from ...core.region import Region
 from ..blender.nodes import shader_tree, trees
 from ..blender.output import float_exr, write_to
@@ -125,7 +126,7 @@ def background_with_holes(
         group = _set_behind(on, world, region)
         parts = _render(on)
     light = next(pixels for name, pixels in parts.items() if name.endswith(group))
-    whole = next(pixels for name, pixels in parts.items() if name.endswith("Combined"))
+    whole = combined(parts)
     out[region.slices] = np.dstack([light[..., :3], whole[..., 3:]])
     return out
 
@@ -144,7 +145,7 @@ def without_holes(
     with stage(scene, view_layer) as on, take(rendered(on), WHOLE):
         _set_behind(on, world, region)
         parts = _render(on)
-    whole = next(pixels for name, pixels in parts.items() if name.endswith("Combined"))
+    whole = combined(parts)
     out[region.slices] = whole[..., 3]
     return out
 

@@ -21,7 +21,7 @@ from ..files import write_text
 from ..hemicube import Hemicube
 from ..patterns import PatternSet, pattern_set
 from .basis_images import BasisImages
-from .names import group_name
+from .names import COMBINED, group_name
 from .tile_data import TileData
 
 VERSION = 1
@@ -186,7 +186,7 @@ def write(
         combined[..., :3] += own
     if alpha is not None:
         combined[..., 3] = alpha
-    layers = {"Combined": combined}
+    layers = {COMBINED: combined}
     for k in range(len(hemicube)):
         for p, name in enumerate(patterns.patterns):
             layers[f"Combined_{group_name(k, name)}"] = basis[k, p].astype(np.float32)

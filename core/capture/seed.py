@@ -13,7 +13,7 @@ from .. import exr
 from ..errors import CaptureSetError
 from ..hemicube import Hemicube
 from ..patterns import PatternSet
-from .names import GRAIN, GROUP, GUIDES, OWN_GROUP, own_layer
+from .names import COMBINED, GRAIN, GROUP, GUIDES, OWN_GROUP, is_combined, own_layer
 from .tile_data import Around
 
 # What is left of Combined when the groups are taken away, as a share of them, when there is no
@@ -54,8 +54,8 @@ class Seed:
                         )
                     wanted.remove(key)
                     self.there[key] = number, layer
-                elif layer == "Combined" or layer.endswith(".Combined"):
-                    self.others.setdefault("Combined", (number, layer))
+                elif is_combined(layer):
+                    self.others.setdefault(COMBINED, (number, layer))
                     combined = True
                 elif match := OWN_GROUP.search(layer):
                     self.others.setdefault(own_layer(match[1]), (number, layer))
@@ -64,7 +64,7 @@ class Seed:
                         if layer == ending or layer.endswith("." + ending):
                             self.others.setdefault(guide, (number, layer))
             if not combined:
-                raise CaptureSetError(f"{file.path} has no part 'Combined': capture again")
+                raise CaptureSetError(f"{file.path} has no part '{COMBINED}': capture again")
         if wanted or not names:
             k, pattern = min(wanted)
             raise CaptureSetError(
@@ -122,13 +122,13 @@ class Seed:
 
     def around(self, lit: NDArray) -> Around:
         """See `BasisImages.around`; lit: the light of all patches in the first file."""
-        number, layer = self.others["Combined"]
+        number, layer = self.others[COMBINED]
         combined = self.files[number].read(layer)
         self._check(number, layer, combined, (*self.of.shape, 4))
         own = np.asarray(combined[..., :3] - lit)
         own[np.abs(own) < ROUNDING * lit] = 0
         guides = {}
-        for guide in self.others.keys() - {"Combined"}:
+        for guide in self.others.keys() - {COMBINED}:
             number, layer = self.others[guide]
             pixels = self.files[number].read(layer)
             guides[guide] = pixels[..., 0] if pixels.shape[-1] == 1 else pixels

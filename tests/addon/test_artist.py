@@ -209,10 +209,10 @@ def test_the_overlay_is_around_the_scene(ready) -> None:
     hemicube = overlay.hemicube_of(ready)
     middle, radius = overlay.middle_of(ready)
     things = len(ready.objects)
-    faces, edges = overlay.triangles(hemicube, middle, overlay.FAR * radius)
+    faces, edges = overlay.triangles(hemicube, middle, 2 * radius)
     assert faces.shape == (6 * len(hemicube), 3) and edges.shape == (8 * len(hemicube), 3)
     far = np.abs(faces - middle).max(axis=-1)
-    np.testing.assert_allclose(far, overlay.FAR * radius, rtol=1e-5)
+    np.testing.assert_allclose(far, 2 * radius, rtol=1e-5)
     for k in (0, len(hemicube) - 1):
         middle_of_patch = faces[6 * k : 6 * k + 6].mean(axis=0) - middle
         assert hemicube.locate(middle_of_patch[None].astype(float))[0][0] == k
