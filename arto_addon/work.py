@@ -1,9 +1,8 @@
-"""Long work as a generator of steps, and the two ways to drive it.
+"""Long work as a generator of steps, and what drives it.
 
-A piece of work yields `Progress` and `Render`. In batch the steps run one after the other and a
-render blocks; behind a button each timer tick takes one step, a render is Blender's own job with
-its progress bar and ESC, and the work waits for it. Cleaning up is the generator's own `finally`,
-so there is one way out however it ends.
+A piece of work yields `Progress` and `Render`. The steps run one after the other, and a render
+blocks: in batch, and in the second Blender that a button starts. Cleaning up is the generator's own
+`finally`, so there is one way out however it ends.
 """
 
 from __future__ import annotations

@@ -266,45 +266,6 @@ def test_edits_go_into_the_snapshot(open_window: Open, blend: Path) -> None:
     w.wait("(status.capture_line(bpy.context.scene) or [0, 0])[1]", 10)
 
 
-RUN_HERE = """
-addon = next(a for n, a in bpy.context.preferences.addons.items() if n.endswith(".arto"))
-addon.preferences.run_here = True
-bpy.context.preferences.is_dirty = False
-"""
-
-
-def test_run_in_this_blender_lets_nothing_through(open_window: Open, blend: Path) -> None:
-    """Keys pressed meanwhile do nothing: no undo, no second capture, no other file; ESC ends it."""
-    w = open_window(blend)
-    w.do(RUN_HERE)
-    w.do("bpy.context.scene.arto.scene_id = 'kept'; bpy.ops.ed.undo_push(message='a')")
-    w.do("bpy.context.scene.objects['ball'].location.x += 1; bpy.ops.ed.undo_push(message='b')")
-    place = w.get("bpy.context.scene.objects['ball'].location.x")
-    before = w.get(CONTENTS)
-    running = "[o.bl_idname for o in bpy.context.window_manager.windows[0].modal_operators]"
-    w.do(SLOW)
-    w.press("capture")
-    w.wait(running)
-    w.key("ctrl+z", "F5", "F6", "F12", "ctrl+n", "x", "Delete", "ctrl+z")
-    assert w.alive and w.get(running).count("ARTO_OT_capture") == 1
-    until = time.monotonic() + 60
-    while w.get(running) and time.monotonic() < until:
-        w.key("Escape")
-        time.sleep(0.3)
-    w.do("bpy.context.scene.arto.samples = 8")
-    assert w.get("bpy.context.scene.objects['ball'].location.x") == place
-    assert w.get(CONTENTS) == before
-    assert not list((blend.parent / "arto").rglob("*.part"))
-    # and the whole way, as its buttons go
-    for button in ("capture", "fit", "relight"):
-        w.press(button)
-        w.wait(f"not {running}", 60)
-    assert w.get("list(bpy.data.images['ARTO Relit'].size)") == [64, 48]
-    assert w.get(CONTENTS)["still"] is False
-    w.key("ctrl+z", "ctrl+z")
-    assert w.alive and w.get("bpy.context.scene.name") == "Scene"
-
-
 def test_two_windows_on_one_shot(open_window: Open, blend: Path) -> None:
     """Line 13: the second is refused with a sentence, the first goes on."""
     one, two = open_window(blend), open_window(blend)

@@ -13,14 +13,6 @@ class ArtoPreferences(bpy.types.AddonPreferences):
 
     bl_idname = ADDON
 
-    run_here: BoolProperty(
-        name="Run in This Blender",
-        description="Capture, fit and relight in this Blender instead of a second one, for "
-        "machines whose memory holds the scene only once. The window takes no input meanwhile, "
-        "but for ESC",
-        default=False,
-    )
-
     research: BoolProperty(
         name="Research Options",
         description="Show the panel Method in the render properties: patches, patterns and "
@@ -29,14 +21,7 @@ class ArtoPreferences(bpy.types.AddonPreferences):
     )
 
     def draw(self, context: bpy.types.Context) -> None:
-        self.layout.prop(self, "run_here")
         self.layout.prop(self, "research")
-
-
-def run_here(context: bpy.types.Context) -> bool:
-    """Whether work runs in this process."""
-    addon = context.preferences.addons.get(ADDON)
-    return bool(addon and addon.preferences and addon.preferences.run_here)
 
 
 def research(context: bpy.types.Context) -> bool:
