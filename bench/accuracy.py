@@ -138,7 +138,7 @@ class Shot:
 
     def pictures(self, world: World, environment: Environment) -> dict[str, NDArray]:
         """Every method's picture under a world."""
-        out = {ARTO: self.arto(world), RAW: self.arto(world, denoise=False)}
+        out: dict[str, NDArray] = {ARTO: self.arto(world), RAW: self.arto(world, denoise=False)}
         lights: dict[Any, PatchLight] = {}
         for name, field in self.fields.items():
             cube = field.hemicube

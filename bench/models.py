@@ -139,12 +139,13 @@ def models(
     hdris = list(hdris)
     for scene_name in scene_names:
         methods = Methods(scene_name, size, samples, 0)
+        index = None
         for hdri in hdris:
             scene, one, two = truth(scene_name, World(hdri), size, many)
             environment = bake(scene, scene.arto.environment_width)
             lights = [PatchLight(environment, h) for h in methods.hemicubes]
             mean = (one.rgb + two.rgb) / 2
-            seen = one.alpha > 0.999
+            seen, index = one.alpha > 0.999, one.index
             floor = metrics.mean_relative_error(one.rgb, two.rgb, seen)
             for name, way in methods.ways.items():
                 picture = way(*lights)
@@ -158,16 +159,17 @@ def models(
                         "noise_floor": floor,
                         **methods.costs[name],
                         "by_material": {
-                            m: metrics.mean_relative_error(picture, mean, seen & (one.index == i))
+                            m: metrics.mean_relative_error(picture, mean, seen & (index == i))
                             for m, i in scenes.MATERIALS[scene_name].items()
                         },
                     }
                 )
             print(f"{scene_name} {hdri} done", flush=True)
-        shares = entry_shares(methods.fields["auto"], one.index, scenes.MATERIALS[scene_name])
-        for row in rows:
-            if row["scene"] == scene_name and row["method"] == "auto":
-                row["shares"] = shares
+        if index is not None:
+            shares = entry_shares(methods.fields["auto"], index, scenes.MATERIALS[scene_name])
+            for row in rows:
+                if row["scene"] == scene_name and row["method"] == "auto":
+                    row["shares"] = shares
         write_rows(out, rows)
     return rows
 

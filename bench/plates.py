@@ -105,8 +105,8 @@ def _hair(thing: bpy.types.Object) -> None:
 class Plate:
     """rgb (H, W, 3), premultiplied; share (H, W, 3) of what is behind; its seconds and renders."""
 
-    rgb: NDArray[np.float32]
-    share: NDArray[np.float32]
+    rgb: NDArray[np.floating]
+    share: NDArray[np.floating]
     seconds: float
     renders: int
 

@@ -182,8 +182,11 @@ def price(rows: list[dict[str, Any]], by_scene: dict[str, Times], samples: int) 
         r |= cost
         r["plain_render_seconds"] = measured.render_of(samples)
         if r["method"] in (ARTO, RAW, NO_LAMPS):
-            once = cost["capture_seconds"] + cost["fit_seconds"]
+            captured, fitted = cost["capture_seconds"], cost["fit_seconds"]
+            relit = cost["relight_seconds"]
+            # all of these methods are measured
+            assert captured is not None and fitted is not None and relit is not None
             rival = rivals[r["scene"], r["hdri"]]
             r["break_even"] = break_even(
-                measured, once, r["mean_relative_error"], cost["relight_seconds"], rival
+                measured, captured + fitted, r["mean_relative_error"], relit, rival
             )

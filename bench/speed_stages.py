@@ -164,7 +164,7 @@ def capture_and_fit(size: Size, folder: Path) -> list[Row]:
         seconds, _ = timed(lambda: work.run(steps))
     field = Field(paths.field_folder(scene))
     (folder / "field.txt").write_text(str(field.folder))
-    found = {"patches": len(field.hemicube), "tiles": len(field.tiles)}
+    found: dict[str, float] = {"patches": len(field.hemicube), "tiles": len(field.tiles)}
     found["field_bytes"] = bytes_of(field.folder)
     found["bytes_a_pixel"] = field.bytes_per_pixel()
     row = {"stage": "capture and fit", "seconds": seconds, "disk_bytes": most[0], **found}
@@ -316,7 +316,7 @@ def synthetic(size: Size, folder: Path) -> list[Row]:
 
     limit = timed(write)[0]
     (folder / "blob").unlink()
-    found = {"patches": len(cube), "bytes_a_pixel": field.bytes_per_pixel()}
+    found: dict[str, float] = {"patches": len(cube), "bytes_a_pixel": field.bytes_per_pixel()}
     fit_row = {"stage": "synthetic fit", "seconds": fitted, "limit_seconds": read}
     write_row = {"stage": "field write", "seconds": written, "limit_seconds": limit}
     rows = [fit_row, write_row | {"disk_bytes": size_there}, *sums(field)]

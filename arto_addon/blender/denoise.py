@@ -84,6 +84,7 @@ def denoise(
             for name, socket in {"Image": noisy, **steer}.items():
                 tree.links.new(socket, node.inputs[name])
             total = node.outputs[0] if total is None else mixed(tree, "ADD", total, node.outputs[0])
-        for name in _DENOISER if like else ():
-            setattr(on.scene.render, name, getattr(like.render, name))
+        if like is not None:
+            for name in _DENOISER:
+                setattr(on.scene.render, name, getattr(like.render, name))
         return np.ascontiguousarray(on.composite(total, (width, height), "denoising")[..., :3])

@@ -40,13 +40,14 @@ def wanted(scene: bpy.types.Scene, centre: Iterable[float], radius: float) -> He
         # the camera looks along its -Z; only its heading counts
         look = -scene.camera.matrix_world.col[2].to_3d()
         angle += math.atan2(-look.x, look.y)
+    x, y, z = (float(along) for along in centre)
     c, sn = math.cos(angle), math.sin(angle)
     return Hemicube(
         faces=tuple(f for f in FACE_NAMES if f in s.faces),
         patches=s.patches,
         half_sides=s.half_sides,
         orientation=((c, -sn, 0.0), (sn, c, 0.0), (0.0, 0.0, 1.0)),
-        centre=tuple(float(x) for x in centre),
+        centre=(x, y, z),
         size=FAR * radius if s.far else s.size,
     )
 

@@ -18,7 +18,7 @@ from ...core.capture.refine import check as can_refine
 from ...core.capture.refine import refine
 from ...core.errors import SceneError
 from ...core.patterns import pattern_set
-from ..stage.bounds import rendered
+from ..stage.bounds import Rendered, rendered
 from ..stage.settings import prepare
 from ..stage.stage import stage
 from ..stage.takes import WHOLE, take
@@ -71,9 +71,8 @@ def together(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> 
         with stage(scene, view_layer) as on:
             seen = rendered(on)
         low, high = np.minimum(low, seen.low), np.maximum(high, seen.high)
-    seen.low, seen.high = low, high
     settings = scene.arto
-    hemicube = planes.wanted(scene, *seen.bounds())
+    hemicube = planes.wanted(scene, *Rendered(low, high).bounds())
     if settings.adaptive:
         can_refine(hemicube)
     route, caution, probes = settings.route, None, []

@@ -12,6 +12,7 @@ from ...core.description import MOST_BYTES
 from ...core.errors import FarmError
 from ...core.files import write_text
 from ...core.regular import read_regular
+from ..blender.addon import ADDON
 from .job import Job
 
 OPENJD = "openjd.json"
@@ -19,11 +20,6 @@ LINES = "commands.txt"
 FLAMENCO = "arto_capture.js"
 # Blender's own start-up, and the add-on alone of what its user has: workers have no preferences.
 QUIET = ["-b", "--factory-startup", "--offline-mode", "--addons"]
-
-
-def addon() -> str:
-    """The extension's module, as `--addons` takes it."""
-    return __package__.rpartition(".arto_addon")[0]
 
 
 def write(job: Job) -> None:
@@ -62,7 +58,7 @@ def openjd(job: Job) -> dict[str, Any]:
         "name": f"ARTO {Path(job.blend).stem}"[:64],
         "parameterDefinitions": [
             {"name": "Blender", "type": "STRING", "default": "blender"},
-            {"name": "Addon", "type": "STRING", "default": addon()},
+            {"name": "Addon", "type": "STRING", "default": ADDON},
             {"name": "Blend", "type": "PATH", "objectType": "FILE", "dataFlow": "IN"},
             {"name": "Job", "type": "PATH", "objectType": "DIRECTORY", "dataFlow": "INOUT"},
         ],
@@ -84,7 +80,7 @@ def openjd(job: Job) -> dict[str, Any]:
 def lines(job: Job) -> list[str]:
     """A line of a shell for each part, and the last one that gathers them. `$BLEND` is the file,
     `$JOB` this folder; they may be run anywhere, in any order, but for the last."""
-    start = ["blender", *QUIET, addon()]
+    start = ["blender", *QUIET, ADDON]
     head = f'{shlex.join(start)} "$BLEND" --command arto'
     return [
         *(f'{head} part {part.number} --job "$JOB"' for part in job.parts),

@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 import bpy
 from bpy.app.handlers import persistent
@@ -23,6 +24,7 @@ from ...core import marked
 from ...core.errors import ArtoError, BusyError, SceneError
 from ...core.files import Lock
 from ...core.units import clock
+from ..blender.addon import ADDON
 from ..blender.quitting import not_when_quitting, when_quitting
 from ..shot import paths, watch
 from ..shot.shot import shot_of
@@ -50,7 +52,7 @@ class Job:
 
     def __init__(self, verb: Verb, scene: bpy.types.Scene, view_layer: str) -> None:
         """Take the snapshot and start. Raises SceneError, BusyError; then nothing is left."""
-        self.verb = verb
+        self.verb: Verb = verb
         self.begun = time.monotonic()
         shot = shot_of(scene, view_layer)
         self.title = shot.title
@@ -120,12 +122,18 @@ class Job:
             return "\n" + "\n".join(text.strip().splitlines()[-8:])
         return ""
 
+    @property
+    def input(self) -> IO[bytes]:
+        """What the job listens to."""
+        assert self.process.stdin is not None  # it was started with a pipe
+        return self.process.stdin
+
     def cancel(self) -> None:
         """Tell it to end: at the next step, or in the middle of a render."""
         self.told = self.told or time.monotonic()
         with contextlib.suppress(OSError, ValueError):
-            self.process.stdin.write(CANCEL.encode())
-            self.process.stdin.flush()
+            self.input.write(CANCEL.encode())
+            self.input.flush()
 
     def remove(self) -> None:
         """Remove its folder, once it has ended."""
@@ -157,8 +165,7 @@ _QUIETLY: dict = (
 
 def _command(blend: Path, task: Path) -> list[str]:
     trusted = "--disable-autoexec" if bpy.app.autoexec_fail else "--enable-autoexec"
-    addon = __package__.rpartition(".arto_addon")[0]
-    line = [bpy.app.binary_path, "-b", trusted, "--addons", addon, str(blend)]
+    line = [bpy.app.binary_path, "-b", trusted, "--addons", ADDON, str(blend)]
     return [*line, "--command", "arto", "job", str(task)]
 
 
@@ -281,7 +288,7 @@ def end() -> None:
         return
     job, current = current, None
     with contextlib.suppress(OSError):
-        job.process.stdin.close()
+        job.input.close()
     with contextlib.suppress(subprocess.TimeoutExpired):
         job.process.wait(2)
     job.lock.__exit__(None, None, None)

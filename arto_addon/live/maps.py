@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from ...core import marked
 from ...core.errors import ArtoError, SceneError
+from ..blender.addon import ADDON
 from ..blender.colour import work_in, working_space
 from ..blender.nodes import shader_tree, trees
 from ..job.snapshot import in_no_file, painted_pixels
@@ -213,10 +214,9 @@ def images(world: bpy.types.World) -> list[bpy.types.Image]:
 
 def command() -> list[str]:
     """What starts the Blender that makes maps; of Blender as a module, a Python with it."""
-    addon = __package__.rpartition(".arto_addon")[0]
     if bpy.app.binary_path and not bpy.app.module:
-        return [bpy.app.binary_path, "-b", "--addons", addon, "--command", "arto", "maps"]
-    run = f"import bpy, {addon}; {addon}.register(); from {__name__} import serve; serve()"
+        return [bpy.app.binary_path, "-b", "--addons", ADDON, "--command", "arto", "maps"]
+    run = f"import bpy, {ADDON}; {ADDON}.register(); from {__name__} import serve; serve()"
     return [sys.executable, "-c", run]
 
 

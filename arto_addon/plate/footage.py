@@ -77,7 +77,8 @@ class Footage:
                 f"the footage '{self.name}' has {bad} pixels that are infinite or not a number: "
                 "repair them, or choose another"
             )
-        return np.ascontiguousarray(rgb.reshape(height, fine, width, fine, 3).mean(axis=(1, 3)))
+        rgb = rgb.reshape(height, fine, width, fine, 3).mean(axis=(1, 3))
+        return np.ascontiguousarray(rgb, np.float32)
 
     def _composited(
         self, scene: bpy.types.Scene, size: tuple[int, int], opaque: bool

@@ -114,10 +114,11 @@ def wire(scene: bpy.types.Scene, group: Any) -> Any:
         node.node_tree = group
         node.label = group.name
         node.width = 200
-        node.location = (0, below - 40)
+        x, y = 0, below - 40
+        node.location = (x, y)
         if not any(n.bl_idname == "CompositorNodeViewer" for n in tree.nodes):
             viewer = tree.nodes.new("CompositorNodeViewer")
-            viewer.location = (node.location.x + 500, node.location.y)
+            viewer.location = (x + 500, y)
             tree.links.new(node.outputs["Image"], viewer.inputs["Image"])
     return node
 

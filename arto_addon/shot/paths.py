@@ -302,14 +302,14 @@ def relit_name(scene: bpy.types.Scene, look: str | None = None) -> str:
 
     The image is then `ARTO <scene> <look>`, the file `<blend>_<scene>_<look>.exr`.
     """
-    look = scene.arto.look.strip() if look is None else look
-    if not look and len(bpy.data.scenes) == 1:
+    shown: str = scene.arto.look.strip() if look is None else look
+    if not shown and len(bpy.data.scenes) == 1:
         return ""
-    name = f"{scene.name} {look}".strip()
+    name = f"{scene.name} {shown}".strip()
     others = [s.name for s in bpy.data.scenes if s != scene]
     # 'A B' under the look C, 'A' under the look B C
-    if any(name.startswith(f"{other} ") for other in others) or look == _PLAIN:
-        name += f"~{short_hash(scene.name, look)}"
+    if any(name.startswith(f"{other} ") for other in others) or shown == _PLAIN:
+        name += f"~{short_hash(scene.name, shown)}"
     return name
 
 

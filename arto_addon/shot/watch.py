@@ -81,7 +81,7 @@ def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
             block = update.id.original
             geometry.add(block.session_uid)
             data = getattr(block, "data", None)
-            if isinstance(data, bpy.types.ID):
+            if data is not None and isinstance(data, bpy.types.ID):
                 geometry.add(data.session_uid)
                 keys = getattr(data, "shape_keys", None)
                 if keys:

@@ -42,7 +42,8 @@ class Rendered:
             raise SceneError("the scene shows nothing: unhide what should be captured")
         centre = (self.low + self.high) / 2
         radius = float(np.linalg.norm(self.high - self.low)) / 2
-        return tuple(float(x) for x in centre), max(radius, 1e-6)
+        x, y, z = (float(along) for along in centre)
+        return (x, y, z), max(radius, 1e-6)
 
     def check(self) -> None:
         """Raise SceneError where shadow catchers cannot be told from the things on them."""

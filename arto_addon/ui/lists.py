@@ -1,5 +1,7 @@
 """What the artist makes lists of: looks, groups of the light, groups of the scene's lamps."""
 
+# pyright: reportInvalidTypeForm=false
+# Blender reads properties from annotations.
 from __future__ import annotations
 
 import math

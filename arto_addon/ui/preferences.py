@@ -1,11 +1,13 @@
 """ARTO's preferences: of the machine, not of a scene."""
 
+# pyright: reportInvalidTypeForm=false
+# Blender reads properties from annotations.
 from __future__ import annotations
 
 import bpy
 from bpy.props import BoolProperty
 
-ADDON = __package__.rpartition(".arto_addon")[0]
+from ..blender.addon import ADDON
 
 
 class ArtoPreferences(bpy.types.AddonPreferences):

@@ -1,5 +1,7 @@
 """Buttons of the panels Shot and Light: the one button, the way back, looks, an HDRI."""
 
+# pyright: reportInvalidTypeForm=false
+# Blender reads properties from annotations.
 from __future__ import annotations
 
 from pathlib import Path

@@ -1,5 +1,7 @@
 """What is of the window and in no file: switches, the world's dials, and what was looked at."""
 
+# pyright: reportInvalidTypeForm=false
+# Blender reads properties from annotations.
 from __future__ import annotations
 
 import math

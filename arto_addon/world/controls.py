@@ -75,8 +75,9 @@ def _add_tint(world: bpy.types.World) -> Any:
         into = background.inputs["Color"]
         times = tree.nodes.new("ShaderNodeMix")
         times.data_type, times.blend_type, times.label = "RGBA", "MULTIPLY", TINT
-        times.location = (background.location.x - 180, background.location.y + 120)
-        dial.location = (times.location.x - 180, times.location.y + 60)
+        x, y = background.location
+        times.location = (x - 180, y + 120)
+        dial.location = (x - 360, y + 180)
         factor, one, other = (s for s in times.inputs if s.enabled)
         factor.default_value = 1.0
         if into.is_linked:

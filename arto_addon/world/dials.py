@@ -116,14 +116,15 @@ def put_in_turner(world: bpy.types.World) -> Any:
     node = tree.nodes.new("ShaderNodeMapping")
     node.name = node.label = TURN
     first = pictures[0]
-    node.location = (first.location.x - 220, first.location.y)
+    x, y = first.location
+    node.location = (x - 220, y)
     links = first.inputs["Vector"].links
     if links:
         source = links[0].from_socket
     else:
         place = tree.nodes.new("ShaderNodeTexCoord")
         place.name = place.label = PLACE
-        place.location = (node.location.x - 220, node.location.y)
+        place.location = (x - 440, y)
         source = place.outputs["Generated"]
     tree.links.new(source, node.inputs["Vector"])
     for picture in pictures:
@@ -155,8 +156,9 @@ def put_in_scaler(world: bpy.types.World) -> Any:
         into = background.inputs["Strength"]
         times = tree.nodes.new("ShaderNodeMath")
         times.operation, times.label = "MULTIPLY", STRENGTH
-        times.location = (background.location.x - 180, background.location.y - 160)
-        dial.location = (times.location.x - 180, times.location.y - 60)
+        x, y = background.location
+        times.location = (x - 180, y - 160)
+        dial.location = (x - 360, y - 220)
         if into.is_linked:
             tree.links.new(into.links[0].from_socket, times.inputs[0])
         else:
