@@ -45,6 +45,8 @@ def empty_take(folder: Path) -> None:
         for there in list(folder.iterdir()):
             if (kind := marked.kind_of(there)) in ("capture", "field"):
                 marked.remove(there, kind, folder)
+            else:
+                marked.remove_empty(there)
         marked.remove_empty(folder)
 
 

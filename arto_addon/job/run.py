@@ -21,7 +21,7 @@ import numpy as np
 
 from ...core import marked
 from ...core.errors import ArtoError, CancelledError, SceneError
-from ..blender import devices
+from ..blender import devices, scripts
 from ..blender.compositing import places_of_groups
 from ..shot import home
 from ..work import STOPPED, Progress, Render, Steps, run
@@ -38,6 +38,10 @@ _OFTEN = 5.0
 def main(path: Path) -> int:
     """Do what the task says; the exit code."""
     folder = path.parent
+    if not marked.is_ours(folder, "job"):
+        # nothing is written into it then, and it is not removed when nobody listens
+        print(f"ARTO: {folder} is no folder of a job of ARTO's: start the work again", flush=True)
+        return 1
     told = _Told(folder)
     writer = _Writer(folder, told)
     state = State()
@@ -68,6 +72,9 @@ def _steps(task: Task, folder: Path) -> Steps:
     scene = bpy.data.scenes.get(task.scene)
     if scene is None:
         raise SceneError(f"there is no scene '{task.scene}'")
+    if task.scripts and task.view_layer in scene.view_layers:
+        scene.view_layers[task.view_layer].update()
+        scripts.check_drivers()
     devices.use(task.devices)
     _turn_paths(folder)
     for painted in task.painted:

@@ -24,6 +24,7 @@ from ...core import marked
 from ...core.errors import ArtoError, BusyError, SceneError
 from ...core.files import Lock
 from ...core.units import clock
+from ..blender import scripts
 from ..blender.addon import ADDON
 from ..blender.quitting import not_when_quitting, when_quitting
 from ..shot import paths, watch
@@ -164,8 +165,7 @@ _QUIETLY: dict = (
 
 
 def _command(blend: Path, task: Path) -> list[str]:
-    trusted = "--disable-autoexec" if bpy.app.autoexec_fail else "--enable-autoexec"
-    line = [bpy.app.binary_path, "-b", trusted, "--addons", ADDON, str(blend)]
+    line = [bpy.app.binary_path, "-b", scripts.option(), "--addons", ADDON, str(blend)]
     return [*line, "--command", "arto", "job", str(task)]
 
 

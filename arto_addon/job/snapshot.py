@@ -41,7 +41,9 @@ def take(folder: Path, verb: Verb, scene: bpy.types.Scene, view_layer: str) -> t
         )
         painted = tuple(_painted(image, folder) for image in bpy.data.images if in_no_file(image))
         _link_caches(folder)
-        task = Task(verb, scene.name, view_layer, bpy.data.filepath, devices.chosen(), painted)
+        ran = not bpy.app.autoexec_fail
+        blend_of = bpy.data.filepath
+        task = Task(verb, scene.name, view_layer, blend_of, devices.chosen(), painted, ran)
         return blend, task.write(folder)
     except (OSError, RuntimeError) as e:
         raise SceneError(

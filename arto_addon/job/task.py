@@ -43,7 +43,8 @@ class Task:
     """What a job is to do.
 
     blend: the artist's file, empty where it was never saved; devices: the artist's render devices,
-    None where Cycles is switched off; painted: images whose pixels are in no file.
+    None where Cycles is switched off; painted: images whose pixels are in no file; scripts: whether
+    the window has refused no script of the file.
     """
 
     verb: Verb
@@ -52,6 +53,7 @@ class Task:
     blend: str
     devices: Devices | None = None
     painted: tuple[Painted, ...] = ()
+    scripts: bool = False
 
     def write(self, folder: Path) -> Path:
         path = folder / TASK
@@ -62,7 +64,7 @@ class Task:
     def read(path: Path) -> Task:
         """Read a task. Raises ArtoError for a file that is none."""
         said = Description(path, _no_task)
-        said.only("verb", "scene", "view_layer", "blend", "devices", "painted")
+        said.only("verb", "scene", "view_layer", "blend", "devices", "painted", "scripts")
         return Task(
             said.choice("verb", VERBS),
             said.text("scene"),
@@ -70,6 +72,7 @@ class Task:
             said.text("blend"),
             _devices(said),
             tuple(_painted(said, entry) for entry in said.kind("painted", list, [])),
+            said.kind("scripts", bool, False),
         )
 
 

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from ...core import marked
 from ...core.errors import ArtoError, SceneError
+from ..blender import scripts
 from ..blender.addon import ADDON
 from ..blender.colour import work_in, working_space
 from ..blender.nodes import shader_tree, trees
@@ -215,7 +216,8 @@ def images(world: bpy.types.World) -> list[bpy.types.Image]:
 def command() -> list[str]:
     """What starts the Blender that makes maps; of Blender as a module, a Python with it."""
     if bpy.app.binary_path and not bpy.app.module:
-        return [bpy.app.binary_path, "-b", "--addons", ADDON, "--command", "arto", "maps"]
+        start = [bpy.app.binary_path, "-b", scripts.option(), "--addons", ADDON]
+        return [*start, "--command", "arto", "maps"]
     run = f"import bpy, {ADDON}; {ADDON}.register(); from {__name__} import serve; serve()"
     return [sys.executable, "-c", run]
 
