@@ -13,6 +13,12 @@ from program_tools import MAKE_SCENE, Program, said
 from tools import package
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What is in the real program comes first: these are the longest tests, and none of them should
+    be left alone at the end of a run of several workers."""
+    items.sort(key=lambda item: "program" not in getattr(item, "fixturenames", ()))
+
+
 @pytest.fixture(scope="session")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Program]:
     if not os.environ.get("BLENDER"):

@@ -79,7 +79,7 @@ class Program:
             line = [*screen, "bash", "-c", DISPLAY, "-", *line]
             environment = {**environment, "ESCAPE": str(escape)}
         return subprocess.run(
-            line, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=120
+            line, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=300
         )
 
     def script(self, text: str, *arguments: str | Path) -> subprocess.CompletedProcess[str]:

@@ -12,7 +12,6 @@ import re
 import shutil
 import signal
 import subprocess
-import time
 from pathlib import Path
 
 import numpy as np
@@ -139,8 +138,8 @@ def test_batch_stops_at_the_first_failure(program: Program, scene: Path) -> None
 
 
 # Presses the buttons one after the other, as an artist would who waits for each. Its arguments: a
-# list of (operator, seconds until ESC or None), and the report to write, of what there is in the
-# file before and after each.
+# list of (operator, whether ESC is pressed while it renders), and the report to write: what is in
+# the file before and after each.
 BUTTONS = """
 import json, sys, time, traceback
 import bpy
@@ -177,15 +176,14 @@ def step():
     if state["at"] >= 0 and running(window):
         operator, escape = presses[state["at"]]
         late = time.monotonic() - state["since"]
-        if late > 30:
+        if late > 120:
             raise TimeoutError(operator)
-        if escape is not None and late > escape and not state["escaped"]:
+        if escape and "basis images" in session.current.state.text and not state["escaped"]:
             state["escaped"] = True
             open(report + ".escape", "w").close()
         return 0.02
     if state["at"] >= 0:
         found[-1]["after"] = contents()
-        found[-1]["seconds"] = time.monotonic() - state["since"]
         found[-1]["escaped"] = state["escaped"]
         found[-1]["outcome"] = [session.outcome.level, session.outcome.text]
     state["at"] += 1
@@ -224,7 +222,7 @@ bpy.app.timers.register(safely, first_interval=1.0)
 """
 
 
-def press(program: Program, scene: Path, *presses: tuple[str, float | None]) -> dict:
+def press(program: Program, scene: Path, *presses: tuple[str, bool]) -> dict:
     """Press buttons in the program's window -> what was there before and after each."""
     for tool in ("xvfb-run", "xdotool"):
         if not shutil.which(tool):
@@ -242,7 +240,7 @@ def press(program: Program, scene: Path, *presses: tuple[str, float | None]) -> 
 
 
 def test_buttons(program: Program, scene: Path, reference: np.ndarray) -> None:
-    out = press(program, scene, ("capture", None), ("fit", None), ("relight", None))
+    out = press(program, scene, ("capture", False), ("fit", False), ("relight", False))
     for pressed in out["presses"]:
         assert pressed["outcome"][0] == "INFO", pressed
     for pressed in out["presses"][:2]:
@@ -259,10 +257,10 @@ def test_escape_in_the_middle(program: Program, scene: Path) -> None:
         "bpy.context.scene.arto.samples = 1 << 16; bpy.ops.wm.save_mainfile()",
         scene,
     )
-    out = press(program, scene, ("capture", 2.0))
+    out = press(program, scene, ("capture", True))
     (pressed,) = out["presses"]
     assert pressed["escaped"]
-    assert pressed["seconds"] < 20
+    assert pressed["outcome"][0] == "WARNING" and "cancelled" in pressed["outcome"][1]
     assert pressed["before"] == pressed["after"]
     assert not list((scene.parent / "arto").rglob("*.exr*"))
 
@@ -280,10 +278,17 @@ def test_interrupted_in_batch(program: Program, scene: Path) -> None:
     for text in running.stdout:
         printed += text
         if "render 1 of" in text:
-            # Blender forgets a signal that comes before its render has begun
-            time.sleep(3)
-            os.killpg(running.pid, signal.SIGINT)
-    assert running.wait(60) == 130, printed
+            break
+    # Blender forgets a signal that comes before its render has begun: once more then
+    for _ in range(20):
+        os.killpg(running.pid, signal.SIGINT)
+        try:
+            running.wait(5)
+            break
+        except subprocess.TimeoutExpired:
+            continue
+    printed += running.stdout.read()
+    assert running.returncode == 130, printed
     assert "cancelled" in printed
     head = json.loads(next((scene.parent / "arto").rglob("capture.json")).read_text())
     assert len(head["tiles"]) > 1 and not any(t["done"] for t in head["tiles"])

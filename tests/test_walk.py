@@ -35,17 +35,7 @@ for area in screen.areas:
     if area.type == "PROPERTIES":
         area.spaces.active.context = "RENDER"
 """
-TAB = """
-for area in bpy.context.window_manager.windows[0].screen.areas:
-    for region in area.regions:
-        if area.type == "VIEW_3D" and region.type == "UI":
-            region.active_panel_category = "ARTO"
-"""
-REGION = (
-    "[[r.x, r.y, r.width, r.height] for a in "
-    "bpy.context.window_manager.windows[0].screen.areas "
-    "if a.type == {area!r} for r in a.regions if r.type == {region!r}][0]"
-)
+TAB = "tab('VIEW_3D')"
 
 
 class Walk:
@@ -81,37 +71,28 @@ class Walk:
         ]
         subprocess.run(line, env={**os.environ, "DISPLAY": self.w.display}, check=True)
 
-    def region(self, area: str, region: str) -> list[int]:
-        return self.w.get(REGION.format(area=area, region=region))
-
-    def sidebar(self, down: int, across: float = 0.45) -> tuple[int, int]:
-        """A place in the sidebar, so many pixels below its top."""
-        x, y, width, height = self.region("VIEW_3D", "UI")
-        return int(x + across * width), 900 - (y + height) + down
-
-    def press(self, down: int, until: str) -> None:
+    def press(self, button: str, until: str) -> None:
         """Click a button of the sidebar until it has done what it does: where software draws the
         window, one that is being drawn anew may miss a click."""
         for _ in range(4):
-            self.w.click(*self.sidebar(down))
+            self.w.click(*self.w.button(button))
             self.clicks += 1
-            end = time.monotonic() + 5
+            end = time.monotonic() + 10
             while time.monotonic() < end:
                 if self.w.get(until):
-                    time.sleep(1.0)  # until the panels stand as they do now
                     return
-                time.sleep(0.1)
-        raise AssertionError(f"the button at {down} does not lead to {until}: {self.w.printed}")
+                time.sleep(0.05)
+        raise AssertionError(f"{button} does not lead to {until}: {self.w.printed}")
 
     def picture(self, u: float, v: float) -> tuple[int, int]:
         """A place on the picture that the image editor shows, from its left and bottom."""
-        x, y, _, _ = self.region("IMAGE_EDITOR", "WINDOW")
+        left, top, _, height = self.w.get("box('IMAGE_EDITOR', 'WINDOW')")
         at = self.w.get(
             f"[r.view2d.view_to_region({u}, {v}, clip=False) for a in "
             "bpy.context.window_manager.windows[0].screen.areas if a.type == 'IMAGE_EDITOR' "
             "for r in a.regions if r.type == 'WINDOW'][0]"
         )
-        return x + at[0], 900 - (y + at[1])
+        return left + at[0], top + height - at[1]
 
 
 @pytest.fixture
@@ -127,8 +108,9 @@ def walk(program: Program, tmp_path: Path) -> Iterator[Walk]:
         yield Walk(opener, blend, folder)
 
 
-# Places in the sidebar, in pixels below its top, while the shot's state is one line.
-CAPTURE, ROTATION, LIVE, ADD_LOOK = 117, 343, 431, 532
+# Buttons of the sidebar.
+CAPTURE, ADD_LOOK = "bpy.ops.arto.shoot()", "bpy.ops.arto.add_look()"
+ROTATION, LIVE = "arto.rotation", "arto.live"
 # On the torus, from the left and the bottom of the picture.
 TORUS = (0.47, 0.415)
 BEGIN = f"""
@@ -161,8 +143,7 @@ NAMES = "sorted(i.name for i in bpy.data.images)"
 def test_an_hour_of_an_artist(walk: Walk, tmp_path: Path, program: Program) -> None:
     w = walk.w
     w.do(ARRANGE)
-    time.sleep(0.5)
-    w.do(TAB)
+    w.wait(TAB)
     w.do(BEGIN)
     state = MODULE.format("ui.state")
     assert w.get(f"{state}.told(bpy.context.scene).lines[0]") == "No capture yet"
@@ -170,18 +151,18 @@ def test_an_hour_of_an_artist(walk: Walk, tmp_path: Path, program: Program) -> N
 
     # capture in one click; ESC; what is done stays, and one click goes on
     walk.press(CAPTURE, "session.current is not None")
-    w.wait("list(paths.place(bpy.context.scene).folder.glob('unfinished-*/tile_0001.exr*'))", 90)
+    w.wait("list(paths.place(bpy.context.scene).folder.glob('unfinished-*/tile_0001.exr*'))")
     walk.shot("capturing")
     w.point(700, 300)
     w.key("Escape")
-    assert w.idle(90)[0] == "WARNING"
+    assert w.idle()[0] == "WARNING"
     told = f"{state}.told(bpy.context.scene)"
     assert w.get(f"{told}.kind") == "unfinished", w.get(f"{told}.lines")
     done = w.get(f"{told}.lines[0]")
     assert "tiles done" in done
     walk.shot("stopped")
     walk.press(CAPTURE, "session.current is not None")
-    level, text = w.idle(240)
+    level, text = w.idle()
     assert level == "INFO", text
     # the plate is there without another click, and up to date
     assert w.get(f"{told}.kind") == "ready"
@@ -196,11 +177,11 @@ def test_an_hour_of_an_artist(walk: Walk, tmp_path: Path, program: Program) -> N
 
     # live: a hand on the slider, then it rests, then it is finished
     walk.press(LIVE, "live.current is not None")
-    w.wait("live.current.settled", 60)
+    w.wait("live.current.settled")
     assert w.get(shown) == ["ARTO Live"]
     before = w.get("bpy.context.scene.world.arto.rotation")
     made = w.get("live.current.viewer.made")
-    x, y = walk.sidebar(ROTATION, 0.3)
+    x, y = w.button(ROTATION, 0.3)
     w.point(x, y)
     w.hold()
     for step in range(36):
@@ -210,9 +191,9 @@ def test_an_hour_of_an_artist(walk: Walk, tmp_path: Path, program: Program) -> N
     assert w.get("bpy.context.scene.world.arto.rotation") != before
     assert w.get("live.current.viewer.made") >= made + 2
     # it may have been finished already while the hand held still
-    w.wait(f"live.current.settled and {result}.plate_line(bpy.context.scene)[1]", 90)
-    assert w.idle(90)[0] == "INFO"
-    w.wait(f"{shown} == ['ARTO Relit']", 20)
+    w.wait(f"live.current.settled and {result}.plate_line(bpy.context.scene)[1]")
+    assert w.idle()[0] == "INFO"
+    w.wait(f"{shown} == ['ARTO Relit']")
     walk.shot("finished")
     walk.press(LIVE, "live.current is None")
     assert "ARTO Live" not in w.get(NAMES)
@@ -222,7 +203,7 @@ def test_an_hour_of_an_artist(walk: Walk, tmp_path: Path, program: Program) -> N
     w.do("bpy.ops.arto.add_look(name='Red')")
     w.do("bpy.context.scene.world.arto.tint = (1, 0.25, 0.15)")
     w.do("bpy.ops.arto.relight_looks('INVOKE_DEFAULT')")
-    assert w.idle(120)[0] == "INFO"
+    assert w.idle()[0] == "INFO"
     first, red = (
         next(iter(exr.read(tmp_path / f"old_Scene_{name}.exr").values()))[..., :3].mean((0, 1))
         for name in ("Look", "Red")
@@ -234,12 +215,12 @@ def test_an_hour_of_an_artist(walk: Walk, tmp_path: Path, program: Program) -> N
     # layers, mixed in the compositor
     w.do("bpy.context.scene.arto.layers = 'FACES'")
     w.do("bpy.ops.arto.relight('INVOKE_DEFAULT')")
-    assert w.idle(120)[0] == "INFO"
+    assert w.idle()[0] == "INFO"
     w.do(
         "area = next(a for a in bpy.context.window_manager.windows[0].screen.areas "
         "if a.type == 'VIEW_3D'); area.ui_type = 'CompositorNodeTree'"
     )
-    time.sleep(0.5)
+    w.wait("area.spaces.active.edit_tree is not None")  # it was drawn
     w.do(
         "mix = next(n for n in bpy.context.scene.compositing_node_group.nodes if "
         "getattr(n, 'node_tree', None) and n.node_tree.name.endswith(' Mix')); "
@@ -253,29 +234,28 @@ def test_an_hour_of_an_artist(walk: Walk, tmp_path: Path, program: Program) -> N
     gain = f"{light}.mixer_of(bpy.context.scene).inputs['LG_left'].default_value"
     assert w.get(gain) == 3.0
     w.do("area.ui_type = 'VIEW_3D'")
-    time.sleep(0.3)
-    w.do(TAB)
+    w.wait(TAB)
 
     # a pixel, and a place of the HDRI
     w.do("bpy.ops.arto.show_plate()")
     w.do("bpy.ops.arto.look_inside('INVOKE_DEFAULT')")
     w.click(*walk.picture(*TORUS))
-    w.wait("'Lit' in bpy.context.window_manager.arto.seen", 30)
+    w.wait("'Lit' in bpy.context.window_manager.arto.seen")
     assert w.get(shown) == ["ARTO Inside"]
     walk.shot("looking_inside")
     w.do("bpy.ops.arto.light_from('INVOKE_DEFAULT')")
     w.click(*walk.picture(1.5 / 4, 2.5 / 3))
-    w.wait("'comes from there' in bpy.context.window_manager.arto.seen", 30)
+    w.wait("'comes from there' in bpy.context.window_manager.arto.seen")
     walk.shot("light_from_the_top")
 
     # the truth, a few samples of it; and where the plate goes
     w.do("bpy.ops.arto.verify('INVOKE_DEFAULT')")
-    assert w.idle(120)[0] == "INFO"
+    assert w.idle()[0] == "INFO"
     assert w.get(shown) == ["ARTO Verify"]
     walk.shot("verified")
     w.do("bpy.context.scene.arto.use_in_compositor = 'RENDER'")
     w.do("bpy.ops.arto.save_composite('INVOKE_DEFAULT')")
-    level, text = w.idle(120)
+    level, text = w.idle()
     assert level == "INFO", text
     assert (tmp_path / "old_Scene_Look_composite.png").is_file()
 
@@ -316,14 +296,11 @@ def test_the_first_picture(walk: Walk, tmp_path: Path, program: Program, capsys)
     w, demo = walk.w, tmp_path / "demo.blend"
     program.script(DEMO, demo)
     w.do(f"bpy.ops.wm.open_mainfile(filepath={str(demo)!r}, load_ui=False)")
-    time.sleep(0.5)
     w.do(ARRANGE)
-    time.sleep(0.5)
-    w.do(TAB)
-    time.sleep(1.0)
+    w.wait(TAB)
     begun = time.monotonic()
     walk.press(CAPTURE, "session.current is not None")
-    level, text = w.idle(240)
+    level, text = w.idle()
     seconds = time.monotonic() - begun
     assert level == "INFO", text
     assert w.get("'ARTO Relit' in [s.image.name for s in live.spaces() if s.image]")
@@ -340,12 +317,6 @@ areas[1].ui_type = "CompositorNodeTree"
 for area in areas:
     area.spaces.active.show_region_ui = True
 """
-TABS = """
-for area in bpy.context.window_manager.windows[0].screen.areas:
-    for region in area.regions:
-        if area.type in {"IMAGE_EDITOR", "NODE_EDITOR"} and region.type == "UI":
-            region.active_panel_category = "ARTO"
-"""
 LANGUAGE = """
 view = bpy.context.preferences.view
 view.language = {0!r}
@@ -360,17 +331,15 @@ def test_panels_in_every_place_and_language(walk: Walk, tmp_path: Path, program:
     German and Japanese, of which pictures are taken."""
     w = walk.w
     w.do(ARRANGE)
-    time.sleep(0.5)
-    w.do(TAB)
+    w.wait(TAB)
     w.do(BEGIN)
     w.do("bpy.context.scene.arto.quality = 'DRAFT'; bpy.context.scene.arto.memory = 0")
     w.do("bpy.ops.arto.shoot('INVOKE_DEFAULT')")
-    level, text = w.idle(240)
+    level, text = w.idle()
     assert level == "INFO", text
     w.do("bpy.context.window_manager.arto.overlay = True")
     drawn = MODULE.format("ui.overlay")
-    w.wait(f"{drawn}.map_of(bpy.context.scene) is not None", 40)
-    time.sleep(1.0)
+    w.wait(f"{drawn}.map_of(bpy.context.scene) is not None")
     walk.number = 19
     walk.shot("patches_around_the_scene")
     w.do("bpy.context.window_manager.arto.overlay = False")
@@ -384,10 +353,9 @@ def test_panels_in_every_place_and_language(walk: Walk, tmp_path: Path, program:
         walk.shot(language)
     w.do(LANGUAGE.format("en_US"))
     w.do(EVERYWHERE)
-    time.sleep(1.0)
-    w.do(TABS)
-    for _ in range(3):
-        w.do("[a.tag_redraw() for a in bpy.context.window_manager.windows[0].screen.areas]")
-        time.sleep(0.5)
+    w.wait("tab('IMAGE_EDITOR', 'NODE_EDITOR')")
+    w.do("watch()")
+    w.do("[a.tag_redraw() for a in bpy.context.window_manager.windows[0].screen.areas]")
+    w.wait("drawn >= {'IMAGE_EDITOR', 'NODE_EDITOR', 'PROPERTIES'}")
     walk.shot("beside_picture_and_nodes")
     assert "Traceback" not in w.printed, w.printed

@@ -32,7 +32,60 @@ folder, buttons = sys.argv[-2], json.loads(sys.argv[-1])
 session = next(m for n, m in sys.modules.items() if n.endswith(".arto_addon.job.session"))
 status = next(m for n, m in sys.modules.items() if n.endswith(".arto_addon.shot.status"))
 paths = next(m for n, m in sys.modules.items() if n.endswith(".arto_addon.shot.paths"))
-names = {"bpy": bpy, "session": session, "status": status, "paths": paths, "at": [0]}
+
+
+def region_of(area_type, region_type):
+    window = bpy.context.window_manager.windows[0]
+    area = next(a for a in window.screen.areas if a.type == area_type)
+    return window, area, next(r for r in area.regions if r.type == region_type)
+
+
+def box(area_type, region_type):
+    # left, top, width and height of a region on the display
+    window, _, region = region_of(area_type, region_type)
+    return [region.x, window.height - region.y - region.height, region.width, region.height]
+
+
+def under(area_type, region_type):
+    # of the button that the mouse is over: how its operator is called in Python, or the path of its
+    # property
+    manager = bpy.context.window_manager
+    manager.clipboard = ""
+    window, area, region = region_of(area_type, region_type)
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        for copy in (bpy.ops.ui.copy_python_command_button, bpy.ops.ui.copy_data_path_button):
+            if copy.poll():
+                copy()
+                break
+    return manager.clipboard
+
+
+def tab(*area_types):
+    # whether the sidebars of these areas show ARTO's tab: one that was never drawn has none yet
+    for area in bpy.context.window_manager.windows[0].screen.areas:
+        for region in area.regions:
+            if area.type in area_types and region.type == "UI":
+                try:
+                    region.active_panel_category = "ARTO"
+                except TypeError:
+                    return False
+    return True
+
+
+drawn = set()
+
+
+def watch():
+    # from now on, where a panel of ARTO is drawn is kept in `drawn`, by the type of the area
+    for panel in bpy.types.Panel.__subclasses__():
+        if ".arto_addon." in panel.__module__:
+            panel.append(lambda self, context: drawn.add(context.area.type))
+
+
+names = {
+    "bpy": bpy, "session": session, "status": status, "paths": paths, "at": [0], "box": box,
+    "under": under, "tab": tab, "drawn": drawn, "watch": watch,
+}
 
 
 def answer():
@@ -87,7 +140,7 @@ class Window:
             self.process = subprocess.Popen(
                 line, cwd=ROOT, env=environment, stdout=log, stderr=subprocess.STDOUT
             )
-        self.do("pass", 40)
+        self.do("pass", 120)
         self.point(700, 400)
 
     def _ask(self, kind: str, code: str, seconds: float) -> Any:
@@ -106,15 +159,15 @@ class Window:
         assert "error" not in out, out["error"]
         return out["value"]
 
-    def do(self, code: str, seconds: float = 20) -> None:
+    def do(self, code: str, seconds: float = 60) -> None:
         """Run Python in the window."""
         self._ask("exec", code, seconds)
 
-    def get(self, expression: str, seconds: float = 20) -> Any:
+    def get(self, expression: str, seconds: float = 60) -> Any:
         """The value of a Python expression in the window."""
         return self._ask("eval", expression, seconds)
 
-    def wait(self, expression: str, seconds: float = 40) -> Any:
+    def wait(self, expression: str, seconds: float = 120) -> Any:
         """Wait until an expression is true; its value."""
         until = time.monotonic() + seconds
         while not (value := self.get(expression)):
@@ -122,40 +175,50 @@ class Window:
             time.sleep(0.05)
         return value
 
-    def _xdotool(self, *arguments: str) -> None:
+    def _gesture(self, *arguments: str) -> None:
+        """Let a hand do something, and wait until the window has taken it."""
         environment = {**os.environ, "DISPLAY": self.display}
         subprocess.run(["xdotool", *arguments], env=environment, check=True, capture_output=True)
+        # it answers before it looks at its events: the second time they were looked at
+        for _ in range(2):
+            self.get("None")
 
     def point(self, x: int, y: int) -> None:
         """Move the mouse."""
-        self._xdotool("mousemove", str(x), str(y))
-        time.sleep(0.1)
+        self._gesture("mousemove", str(x), str(y))
 
     def click(self, x: int, y: int) -> None:
         self.point(x, y)
-        self._xdotool("click", "1")
-        time.sleep(0.1)
+        self._gesture("click", "1")
 
     def hold(self) -> None:
         """Press the mouse's button, and keep it pressed."""
-        self._xdotool("mousedown", "1")
-        time.sleep(0.1)
+        self._gesture("mousedown", "1")
 
     def let_go(self) -> None:
-        self._xdotool("mouseup", "1")
-        time.sleep(0.1)
+        self._gesture("mouseup", "1")
 
     def key(self, *keys: str) -> None:
         """Press keys, `ctrl+z` for one."""
         for key in keys:
-            self._xdotool("key", key)
-            time.sleep(0.15)
+            self._gesture("key", key)
+
+    def button(self, what: str, across: float = 0.45) -> tuple[int, int]:
+        """Find a button of the sidebar: the mouse goes down it until the window says that the
+        button under the mouse is `what`: "bpy.ops.arto.shoot()", or "arto.rotation"."""
+        left, top, width, height = self.get("box('VIEW_3D', 'UI')")
+        x = int(left + across * width)
+        for y in range(top + 5, top + height, 8):
+            self.point(x, y)
+            if self.get("under('VIEW_3D', 'UI')") == what:
+                return x, y
+        raise AssertionError(f"no button {what} in the sidebar\n{self.printed[-3000:]}")
 
     def press(self, button: str) -> None:
         """Call one of ARTO's operators as its button does."""
         self.key(BUTTONS[button])
 
-    def idle(self, seconds: float = 60) -> list[str]:
+    def idle(self, seconds: float = 240) -> list[str]:
         """Wait until no job runs -> how the last one ended: level and text."""
         self.wait("session.current is None and session.outcome is not None", seconds)
         return self.get("[session.outcome.level, session.outcome.text]")
@@ -173,7 +236,7 @@ class Window:
         """End it from inside, as Ctrl+Q without unsaved changes does -> what it printed."""
         path = self.folder / f"ask{self.asked}.py"
         path.write_text("exec\nbpy.app.timers.register(bpy.ops.wm.quit_blender)")
-        self.process.wait(30)
+        self.process.wait(120)
         return self.printed
 
     def kill(self) -> None:
