@@ -58,7 +58,7 @@ def on(scene):
 
 def _rest(on: live.Live) -> np.ndarray:
     """Tick until the whole picture is shown -> it, top-down."""
-    until = time.monotonic() + 60
+    until = time.monotonic() + 240
     while True:
         on.dirty = True
         assert on.tick()
@@ -142,7 +142,7 @@ def test_the_newest_wish_wins(on) -> None:
     try:
         for i in range(1000):
             viewer.wish(Wish(image, 1 + i, 0.0, 0.0, {}, resting=True))
-        until = time.monotonic() + 20
+        until = time.monotonic() + 240
         last = None
         while time.monotonic() < until:
             last = viewer.take() or last
@@ -164,7 +164,7 @@ def test_a_map_that_is_on_its_way_is_shown_though_the_hand_moved_on(scene, on) -
     """Else a hand that never rests would see nothing."""
     _rest(on)
     made = on.viewer.made
-    until = time.monotonic() + 15
+    until = time.monotonic() + 240
     i = 0
     while time.monotonic() < until and on.viewer.made < made + 3:
         i += 1
@@ -179,7 +179,7 @@ def test_a_map_that_is_on_its_way_is_shown_though_the_hand_moved_on(scene, on) -
 def _answer(made: maps.Maps, scene, key: str) -> str:
     """Ask for a map of another tint, by that key -> what went wrong."""
     assert made.ask(scene, scene.view_layers[0].name, scene.world, key, False)
-    until = time.monotonic() + 60
+    until = time.monotonic() + 240
     while made.busy:
         assert time.monotonic() < until
         time.sleep(0.02)
@@ -197,7 +197,7 @@ def test_a_killed_blender_is_said_and_another_one_is_started(scene) -> None:
         # in the middle of a question
         made.ask(scene, scene.view_layers[0].name, scene.world, "lost", False)
         made._process.kill()
-        until = time.monotonic() + 20
+        until = time.monotonic() + 240
         while made.busy and time.monotonic() < until:
             time.sleep(0.02)
         assert made.get("lost", False) is not None or "ended" in made.trouble_with("lost")
@@ -258,7 +258,7 @@ def test_maps_are_those_of_a_relight(scene) -> None:
     try:
         key = kept.shows(scene, scene.world)[0]
         made.ask(scene, scene.view_layers[0].name, scene.world, key, True)
-        until = time.monotonic() + 60
+        until = time.monotonic() + 240
         while made.get(key, True) is None:
             assert not made.trouble, made.trouble
             assert time.monotonic() < until
@@ -306,7 +306,7 @@ def test_a_linked_world(tmp_path) -> None:
     try:
         key = kept.shows(scene, scene.world)[0]
         made.ask(scene, scene.view_layers[0].name, scene.world, key, True)
-        until = time.monotonic() + 60
+        until = time.monotonic() + 240
         while made.get(key, True) is None:
             assert not made.trouble, made.trouble
             assert time.monotonic() < until
