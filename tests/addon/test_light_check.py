@@ -105,7 +105,7 @@ def test_a_room_behind_such_glass_is_relit_as_cycles_renders_it(tmp_path):
     scene, window = room(tmp_path)
     add_mesh(scene, "Pane", window, [(0, 1, 2, 3)], architects_glass())
     scene.cycles.caustics_refractive = scene.cycles.caustics_reflective = False
-    scene.arto.patches, scene.arto.samples, scene.arto.patterns = 4, 512, "linear"
+    scene.arto.patches, scene.arto.samples, scene.arto.patterns = 4, 256, "linear"
     there = captured(scene)
     assert there.head["route"] == "sampled" and len(there.files[0]) == 3
     # the patterns share their paths: no mean lies off its patch
@@ -121,7 +121,7 @@ def test_a_room_behind_such_glass_is_relit_as_cycles_renders_it(tmp_path):
         truth = (one + two)[..., :3] / 2
         noise = np.abs(one - two)[..., :3].mean() / truth.mean()
         assert abs(picture[..., :3].mean() / truth.mean() - 1) < 0.03
-        # what is left is where the light is, not how much: 0.06 and 0.15 over the noise
+        # what is left is where the light is, not how much: 0.08 and 0.15 over the noise
         assert np.abs(picture[..., :3] - truth).mean() / truth.mean() < noise + 0.18
 
 
