@@ -4,9 +4,9 @@ It also unfolds the hemicube into a picture in which the supports of a pixel can
 
 Examples
 --------
->>> around, patch, u, v = unfolded(Hemicube(patches=1), 2)
->>> patch[:, ::2].tolist()  # top; left, right; bottom: rows of two pixels a face
-[[-1, 0...
+>>> around, patch, u, v = unfolded(Hemicube(patches=1), 2)  # a cross of six faces of 2 x 2 pixels
+>>> around.shape, int((patch >= 0).sum())
+((6, 8, 3), 24)
 """
 
 from __future__ import annotations

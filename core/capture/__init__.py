@@ -1,1 +1,1 @@
-"""What comes back: the capture set on disk, its basis images, and what they say (paper 4)."""
+"""What comes back: the capture set on disk, its basis images, and their moments (paper 4)."""

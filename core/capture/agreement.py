@@ -1,8 +1,17 @@
-"""Whether two pictures of one light agree: by regions, and by more than their noise.
+"""Agreement: whether two pictures of one light differ by more than their noise, region by region.
 
-The sum of what all patches bring must be what a white world brings. Where it is not, something
-keeps the patches from lighting the scene as a world does, and every picture of the capture is wrong
-by as much.
+The light of all patches together must equal the light of a white world. If it does not, something
+keeps the patches from lighting the scene as a world does, and every basis image is wrong by as
+much.
+
+Examples
+--------
+>>> noise = np.random.default_rng(0).normal(0, 0.02, (3, 60, 60, 3))
+>>> renders = 1 + noise
+>>> agreement(renders[0], renders[1:]).agrees
+True
+>>> agreement(0.7 * renders[0], renders[1:]).agrees
+False
 """
 
 from __future__ import annotations
@@ -14,20 +23,31 @@ from numpy.typing import NDArray
 
 # Pixels a side of the regions that are compared.
 BLOCK = 6
-# A region differs by more than this share of its light, and by so many standard errors; the smaller
-# share is for a scene that is known to be lit otherwise by one of the two.
+# A region differs if it is off by more than this share of its light and by so many standard errors.
+# The smaller share is for a scene that is known to be lit differently in one of the two pictures.
 DIFFERENT, SUSPECTED = 0.15, 0.03
 SURE = 6.0
-# So many regions of a hundred that differ are no accident of one firefly.
+# A single firefly never makes a larger share of regions differ.
 SHARE = 0.04
-# Of a white world's radiance: less light than this in all the picture is none.
+# A picture with less light than this share of a white world's radiance counts as dark.
 DARK = 2e-3
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """ratio: all light of the one over that of the other; worst: the ratio in the regions that
-    differ; share: of the regions that do, 0 to 1; dark: whether next to no light gets in at all."""
+    """How two pictures of one light compare.
+
+    Parameters
+    ----------
+    ratio : float
+        All light of the first over all light of the second.
+    worst : float
+        The same ratio in the regions that differ.
+    share : float
+        The share of regions that differ, 0 to 1.
+    dark : bool
+        Whether next to no light reaches the picture.
+    """
 
     ratio: float
     worst: float
@@ -36,6 +56,7 @@ class Agreement:
 
     @property
     def agrees(self) -> bool:
+        """Whether so few regions differ that noise explains them."""
         return self.share <= SHARE
 
 
@@ -45,11 +66,24 @@ def agreement(
     always: NDArray | float = 0.0,
     different: float = DIFFERENT,
 ) -> Agreement:
-    """Compare `found` with the mean of `expected`, renders of other seeds.
+    """Compare a picture with the mean of several renders.
 
-    found: (H, W, 3); expected: (N, H, W, 3), N at least 2; always: (H, W, 3), light that is in
-    all of them and none of the matter; different: the share of its light by which a region must be
-    off. Non-finite pixels are left out.
+    Pixels that are not finite are left out.
+
+    Parameters
+    ----------
+    found : (H, W, 3) float
+        Scene-linear.
+    expected : (N, H, W, 3) float
+        N renders of other seeds, at least 2.
+    always : (H, W, 3) float
+        Light that all of them have and that is not compared.
+    different : float
+        The relative difference from which on a region differs.
+
+    Returns
+    -------
+    Agreement
     """
     one = (found - always).sum(axis=-1).astype(np.float64)
     many = (expected - always).sum(axis=-1).astype(np.float64)
@@ -71,7 +105,7 @@ def agreement(
     error = apart.std(axis=1) / np.sqrt(n)
     mean = light.mean(axis=1)
     total = max(float(truth.mean()), 1e-12)
-    # what is dark beside the picture may be wrong by much of itself
+    # regions much darker than the picture may be off by a large share of their light
     floor = np.maximum(mean, 0.1 * total)
     differs = (np.abs(apart.mean(axis=1)) > different * floor) & (
         np.abs(apart.mean(axis=1)) > SURE * error

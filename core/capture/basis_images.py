@@ -1,7 +1,16 @@
-"""Basis images: one tile's pictures under each patch and pattern, read patch by patch (paper 4.3).
+"""Basis images: the pictures of one tile under each patch and pattern, read patch by patch (paper
+4.3).
 
-A stack of them is as large as a tile gets, and nothing needs it all at once: the fit reads a patch,
-then the next. Only what hangs on all of them, the light that is no patch's, takes a pass over all.
+All basis images together are the largest data of a tile, and no step needs them at once: the fit
+reads one patch after the other. Only the light that belongs to no patch takes a pass over all.
+
+Examples
+--------
+The mean of two seeds, of which the first has a quarter of the samples:
+
+>>> first, second = np.full(2, 1.0, np.float32), np.full(2, 2.0, np.float32)
+>>> _mean((0.25, first), [(0.75, second)]).tolist()
+[1.75, 1.75]
 """
 
 from __future__ import annotations
@@ -23,10 +32,25 @@ from .tile_data import Around, TileData
 
 
 class BasisImages:
-    """A tile's basis images on disk, opened. To be closed.
+    """The basis images of a tile on disk, opened; a context manager that closes them.
 
-    renders: of each seed the share that it has of the samples, and its files' names. Raises
-    CaptureSetError for what is missing, twice, or not of this set.
+    Parameters
+    ----------
+    folder : Path
+        The capture set's folder.
+    renders : list of (float, list of str)
+        For each seed its share of the samples and the names of its files.
+    region : Region
+        The tile's place in the picture.
+    hemicube : Hemicube
+    patterns : PatternSet
+    grain : bool
+        Whether the grain was captured, see `names.GRAIN`.
+
+    Raises
+    ------
+    CaptureSetError
+        A file or a basis image is missing, there twice, or of another capture set.
     """
 
     def __init__(
@@ -57,15 +81,46 @@ class BasisImages:
 
     @property
     def shape(self) -> tuple[int, int]:
+        """(height, width) of the tile."""
         return self.region.height, self.region.width
 
     def images(self, k: int) -> NDArray[np.float32]:
-        """(P, h, w, 3), the images of patch k. Raises CaptureSetError for what bends the light."""
+        """Read the basis images of a patch, the mean over seeds.
+
+        Parameters
+        ----------
+        k : int
+
+        Returns
+        -------
+        (P, h, w, 3) float32
+
+        Raises
+        ------
+        CaptureSetError
+            An image would falsify the light: a wrong size or type, negative or not finite pixels.
+        """
         total, *others = ((s.share, s.images(k)) for s in self._seeds)
         return _mean(total, others)
 
     def coefficient(self, k: int, patterns: PatternSet) -> NDArray[np.float32]:
-        """(h, w, 3), R of patch k: where one pattern shows it, the others are not read."""
+        """Compute the reflection coefficient R of a patch.
+
+        Parameters
+        ----------
+        k : int
+        patterns : PatternSet
+            Where one pattern shows R, the images of the others are not read.
+
+        Returns
+        -------
+        (h, w, 3) float32
+
+        Raises
+        ------
+        CaptureSetError
+            As `images`.
+        """
         which = patterns.shown_by
         if which is None:
             return patterns.coefficient(self.images(k))
@@ -74,12 +129,35 @@ class BasisImages:
         return _mean(total, others)
 
     def images_at(self, k: int, pixels: NDArray[np.intp]) -> NDArray[np.float32]:
-        """(P, n, 3) of n pixels, by their numbers row by row; of images that were looked at."""
+        """Read the basis images of a patch in some pixels.
+
+        The images must have been checked before, by `images` or `around`.
+
+        Parameters
+        ----------
+        k : int
+        pixels : (n,) int
+            Numbers of pixels, row by row.
+
+        Returns
+        -------
+        (P, n, 3) float32
+        """
         total, *others = ((s.share, s.images_at(k, pixels)) for s in self._seeds)
         return _mean(total, others)
 
     def grain_of(self, k: int) -> NDArray[np.float32] | None:
-        """(h, w), see `TileData`; None where it was not captured."""
+        """Compute the grain of a patch, see `names.GRAIN`.
+
+        Parameters
+        ----------
+        k : int
+
+        Returns
+        -------
+        (h, w) float32 or None
+            None where it was not captured.
+        """
         if not self.grain:
             return None
         white = self.patterns.coefficient(self.images(k)).sum(axis=-1)
@@ -87,8 +165,23 @@ class BasisImages:
         return np.asarray(2 * _mean(total, others) - white)
 
     def around(self, look: Callable[[int, NDArray], None]) -> Around:
-        """What hangs on all patches. `look` is told of each one's number and images, (P, h, w, 3),
-        on the way; it must not keep them. Raises CaptureSetError."""
+        """Compute what is around the basis images, in one pass over all of them.
+
+        Parameters
+        ----------
+        look : callable
+            Called with the number of each patch and its images (P, h, w, 3), which it must not
+            keep.
+
+        Returns
+        -------
+        Around
+
+        Raises
+        ------
+        CaptureSetError
+            As `images`.
+        """
         lit = [np.zeros((*self.shape, 3)) for _ in self._seeds]
         for k in range(len(self.hemicube)):
             found = []
@@ -114,7 +207,17 @@ class BasisImages:
         return Around(mean([a.own for a in layers]), mean([a.alpha for a in layers]), guides)
 
     def read(self) -> TileData:
-        """All at once."""
+        """Read the whole tile into memory.
+
+        Returns
+        -------
+        TileData
+
+        Raises
+        ------
+        CaptureSetError
+            As `images`.
+        """
         basis = np.empty((len(self.hemicube), len(self.patterns), *self.shape, 3), np.float32)
 
         def keep(k: int, images: NDArray) -> None:
@@ -129,7 +232,9 @@ class BasisImages:
 
 
 def _mean(first: tuple[float, NDArray], others: list[tuple[float, NDArray]]) -> NDArray:
-    """The mean of some images by their shares of the samples; one alone is left as it is."""
+    """The mean of images, weighted by their shares of the samples; a single image is returned as it
+    is.
+    """
     share, image = first
     if not others:
         return image

@@ -1,9 +1,18 @@
-"""Moments: what the basis images of one patch say about how its light reaches the pixels.
+"""Moments: what the basis images of a patch say about how its light reaches the pixels.
 
 For the transport T(u, v) from a patch to a pixel, moment m is the integral of T times the m-th of
-`patterns.MONOMIALS`. The zeroth is the reflection coefficient R (paper 3); the others over it are
-the mean place on the patch that the pixel sees, and its spread. T has the solid angle in it: a
-patch that is seen evenly has the moments `Moments.uniform`, which are not those of its area.
+`patterns.MONOMIALS`. The zeroth moment is the reflection coefficient R (paper 3). The others,
+divided by it, are the mean place on the patch that the pixel sees, and its spread. T includes the
+solid angle: a patch that is seen evenly has the moments `Moments.uniform`, which differ from the
+moments of its area.
+
+Examples
+--------
+>>> from arto.core.patterns import pattern_set
+>>> basis = np.array([0.4, 0.1, 0.08])[:, None, None] * np.ones((1, 1, 3))  # white, u, v
+>>> found = Moments.from_basis(basis, pattern_set("linear"), (-1.0, 1.0, -1.0, 1.0))
+>>> [round(float(x[0]), 3) for x in found.mean]
+[0.25, 0.2]
 """
 
 from __future__ import annotations
@@ -20,13 +29,19 @@ from ..patterns import ONE, UU, UV, VV, PatternSet, U, V
 
 @dataclass(frozen=True)
 class Moments:
-    """Moments of n pixels for one patch.
+    """The moments of n pixels for one patch.
 
-    coefficient: (n, 3) reflection coefficient R per channel. normalised: (6, n) moments shared by
-    the channels, over the zeroth; NaN where the patterns cannot tell. A pixel without light from
-    the patch has those of the whole patch. extent: where the patch is on its face, which says what
-    its solid angle is. channels: the same for red, green and blue by themselves, where they were
-    asked for.
+    Parameters
+    ----------
+    coefficient : (n, 3) float
+        The reflection coefficient R of each channel.
+    normalised : (6, n) float64
+        The moments over the zeroth, shared by the channels. NaN where the patterns do not identify
+        them; those of an evenly seen patch where a pixel gets no light from it.
+    extent : tuple of 4 float
+        The place of the patch on its face, which determines its density of solid angle.
+    channels : tuple of Moments
+        The moments of red, green and blue alone, if they were asked for.
     """
 
     coefficient: NDArray
@@ -38,10 +53,21 @@ class Moments:
     def from_basis(
         basis: NDArray, patterns: PatternSet, extent: Extent, per_channel: bool = False
     ) -> Moments:
-        """basis: (P, n, 3) -> the moments. The channels share a support, as in the paper (5).
+        """Compute the moments from basis images. The channels share a support, as in the paper (5).
 
-        extent: of the patch, see `Hemicube.extent`; per_channel: also the moments of each channel
-        by itself, in `channels`.
+        Parameters
+        ----------
+        basis : (P, n, 3) float
+            Basis images of the patch, scene-linear radiance.
+        patterns : PatternSet
+        extent : tuple of 4 float
+            The place of the patch, see `Hemicube.extent`.
+        per_channel : bool
+            Whether to compute `channels` too.
+
+        Returns
+        -------
+        Moments
         """
         # float64: a narrow support is a small difference of large moments
         shared = patterns.moments(channel_sum(basis))
@@ -53,7 +79,16 @@ class Moments:
         return Moments(coefficient, normalise(shared, extent), extent, channels)
 
     def select(self, pixels: NDArray) -> Moments:
-        """The moments of some of the pixels (a mask or indices)."""
+        """Take the moments of some pixels.
+
+        Parameters
+        ----------
+        pixels : (n,) bool or (m,) int
+
+        Returns
+        -------
+        Moments
+        """
         return Moments(
             self.coefficient[pixels],
             self.normalised[:, pixels],
@@ -63,17 +98,17 @@ class Moments:
 
     @property
     def uniform(self) -> NDArray[np.float64]:
-        """(6,) normalised moments of a pixel that sees the whole patch evenly."""
+        """(6,) float64: the normalised moments of a pixel that sees the whole patch evenly."""
         return uniform_moments(self.extent)
 
     @cached_property
     def mean(self) -> tuple[NDArray, NDArray]:
-        """Centre of the light's origin on the patch, (u, v), each (n,)."""
+        """The mean place on the patch that a pixel sees: u and v, each (n,)."""
         return self.normalised[U], self.normalised[V]
 
     @cached_property
     def variance(self) -> tuple[NDArray, NDArray]:
-        """Variances along u and v, each (n,), not below 0."""
+        """The variances along u and v, each (n,), at least 0."""
         mu, mv = self.mean
         return (
             np.maximum(self.normalised[UU] - mu * mu, 0),
@@ -82,21 +117,41 @@ class Moments:
 
     @cached_property
     def covariance(self) -> NDArray:
-        """Covariance of u and v, (n,)."""
+        """(n,): the covariance of u and v."""
         mu, mv = self.mean
         return self.normalised[UV] - mu * mv
 
 
 def channel_sum(images: NDArray) -> NDArray[np.float64]:
-    """(..., 3) -> (...), the sum over channels; numpy's own is slow over an axis so short."""
+    """Sum over the channels. numpy's own sum is slow over an axis this short.
+
+    Parameters
+    ----------
+    images : (..., 3) float
+
+    Returns
+    -------
+    (...) float64
+    """
     return images[..., 0].astype(np.float64) + images[..., 1] + images[..., 2]
 
 
 def normalise(moments: NDArray, extent: Extent) -> NDArray:
-    """(6, n) moments over the zeroth, held inside what any transport on [0, 1]^2 can have; those of
-    the whole patch where there is no light."""
+    """Divide moments by the zeroth, and keep them within what a transport on [0, 1]^2 can have.
+
+    Parameters
+    ----------
+    moments : (6, n) float64
+    extent : tuple of 4 float
+        The place of the patch on its face.
+
+    Returns
+    -------
+    (6, n) float64
+        Those of an evenly seen patch where there is no light.
+    """
     total = moments[ONE]
-    # what is not a number is no evidence of a support either
+    # moments that are not finite are no evidence of a support
     lit = (total > 0) & np.isfinite(moments[[ONE, U, V]]).all(axis=0)
     out = moments / np.where(lit, total, 1)
     out[:, ~lit] = uniform_moments(extent)[:, None]

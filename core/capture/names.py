@@ -1,4 +1,12 @@
-"""The names that a capture set's files have for basis images and for the layers beside them."""
+"""The names of basis images in a capture set's files, and of the layers beside them.
+
+Examples
+--------
+>>> group_name(7, "white"), own_layer("Key light")
+('ARTO_0007_white', 'own_Key light')
+>>> GROUP.search("ViewLayer.Combined_ARTO_0007_white").groups()
+('0007', 'white')
+"""
 
 from __future__ import annotations
 
@@ -11,7 +19,7 @@ from ..shot import safe_name
 Pixels = TypeVar("Pixels")
 # The layer of the whole picture, with its alpha.
 COMBINED = "Combined"
-# After ARTO there may be a number, where a light group of the artist's has the name without.
+# A number follows ARTO where one of the artist's light groups has the name without a number.
 GROUP = re.compile(r"(?:^|\.)Combined_ARTO(?:-\d+)?_(\d{4})_(\w+)$")
 # Layers beside the basis images, by the end of their part's name.
 GUIDES = {
@@ -20,15 +28,16 @@ GUIDES = {
     "depth": "Depth",
     "position": "Position",
 }
-# Of them those that are of one ray through a pixel, its first: a mean of two is no place at all.
+# Guides of the first ray through a pixel. A mean of two places would be neither of them.
 OF_ONE_RAY = ("depth", "position")
 # The light groups of the scene's own lamps, as their artist named them.
 OWN_GROUP = re.compile(r"(?:^|\.)Combined_(.+)$")
-# The pattern that shows the noise: a patch of grains so fine that no reflection resolves them, half
-# of them lit, at random. A light path meets a lit grain or a dark one as a coin falls, so twice
-# this image less the white one is a sum of the paths' weights with random signs: its square is, on
-# average, the sum of their squares, which is the variance of the white image. It is no polynomial
-# and no part of the pattern set; it must share its render, and so its paths, with the others.
+# The pattern that shows the noise: grains so fine that no reflection resolves them, of which a
+# random half is lit. A light path meets a lit or a dark grain by chance. So twice this image minus
+# the white one is the sum of the paths' weights with random signs. Its square is, on average, the
+# sum of the squared weights, which is the variance of the white image. This pattern is no
+# polynomial and does not belong to the pattern set. It must be captured in the same render as the
+# others, so that it has the same paths.
 GRAIN = "grain"
 
 
@@ -74,10 +83,31 @@ def combined(layers: Mapping[str, Pixels]) -> Pixels:
 
 
 def group_name(k: int, pattern: str) -> str:
-    """The light group of patch k under a pattern."""
+    """Name the light group of a patch under a pattern.
+
+    Parameters
+    ----------
+    k : int
+        The number of the patch.
+    pattern : str
+
+    Returns
+    -------
+    str
+    """
     return f"ARTO_{k:04d}_{pattern}"
 
 
 def own_layer(group: str) -> str:
-    """The layer of the light of a group of the scene's own lamps."""
+    """Name the layer that holds the light of one of the scene's own light groups.
+
+    Parameters
+    ----------
+    group : str
+        The light group's name in the scene.
+
+    Returns
+    -------
+    str
+    """
     return f"own_{safe_name(group)}"

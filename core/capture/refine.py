@@ -1,11 +1,20 @@
-"""Which patches a scene needs: small ones where its light is told apart, large ones where not.
+"""Refinement: small patches where a scene tells their light apart, large patches elsewhere.
 
-A cheap probe shows how each cell of a 16x16 grid on every face lights the pixels. From it follows
-what a patch of any size would get wrong with the linear support (paper 5; `supports.linear`): the
-part of the transport over its cells that no plane follows. Light itself is not known yet, but it is
-alike in directions a few cells apart, so what is wrong counts as its size under such light. Patches
-are then split where that saves most, as long as there are patches left to give, and joined again
-where it costs next to nothing.
+A cheap probe shows how each cell of a 16 x 16 grid on every face lights the pixels. From the probe
+follows the error of a patch of any size under the linear support (paper 5; `supports.linear`): the
+part of the transport over its cells that is not a plane. The environment is unknown when a scene
+is captured, but directions a few cells apart have similar light. So an error is measured by its
+expected size under such light. Patches are split where this saves most, as long as patches are
+left to give, and joined again where joining costs next to nothing.
+
+Examples
+--------
+>>> start = Hemicube(patches=1)
+>>> probe = np.zeros((6 * 256, 1, 1, 3))
+>>> probe[0] = 1.0  # all light comes from the cell in a corner of the face "top"
+>>> found = refine(start, probe, samples=1e6, most=20)
+>>> len(found) <= 20, found.closed, sorted({face for face, n, *_ in found.leaves if n > 1})
+(True, True, ['top'])
 """
 
 from __future__ import annotations
@@ -23,10 +32,10 @@ from ..faces import FINEST, LEAF_SIDES, Leaf
 from ..hemicube import Hemicube
 from .moments import channel_sum
 
-# Cells (5.6 degrees) over which light stays alike: its correlation falls to 1/e.
+# Cells (of 5.6 degrees) over which the correlation of light falls to 1/e.
 ALIKE = 3.0
-# Four patches are joined when that surely adds less than this to a pixel's squared relative error:
-# far under what a capture's noise has.
+# Four patches are joined when that surely adds less than this to a pixel's squared relative error.
+# The noise of a capture is far larger.
 NOTHING_LOST = 1e-6
 # A split that does not surely save more is not worth three patches.
 NOTHING_GAINED = 3e-6
@@ -36,9 +45,12 @@ SURE = 2.0
 
 @lru_cache(maxsize=8)
 def _filters(size: int) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """For a patch of size x size cells: F with |F t|^2 the squared error, on average over light, of
-    the linear support for a transport t; what noise of variance 1 in each cell adds to it; and the
-    variance of that, in its own square, for one pixel."""
+    """The error of the linear support for a patch of size x size cells.
+
+    Gives F, for which |F t|^2 is the mean squared error over light for a transport t; the increase
+    of that by noise of variance 1 in each cell; and the variance of the increase, relative to its
+    square, for one pixel.
+    """
     x = (np.arange(size) + 0.5) / size - 0.5
     u, v = (t.ravel() for t in np.meshgrid(x, x))
     plane = np.stack([np.ones_like(u), u, v])
@@ -61,8 +73,7 @@ class _Costs:
         self.known: dict[tuple[int, int, int], tuple[float, float]] = {}
 
     def of(self, n: int, row: int, column: int) -> tuple[float, float]:
-        """The cost of a patch, of which there would be n x n on the face, and the standard
-        deviation of that."""
+        """The cost of a patch, n x n of which make up the face, and its standard deviation."""
         key = n, row, column
         if key not in self.known:
             self.known[key] = self._cost(*key)
@@ -81,7 +92,7 @@ class _Costs:
         return found - expected, expected * math.sqrt(spread / pixels)
 
     def gain(self, n: int, row: int, column: int, sure: float) -> float:
-        """What splitting a patch in four saves, give or take `sure` standard deviations."""
+        """What splitting a patch in four saves, plus `sure` standard deviations."""
         if n == FINEST:
             return 0.0
         cost, deviation = self.of(n, row, column)
@@ -90,7 +101,17 @@ class _Costs:
 
 
 def check(hemicube: Hemicube) -> None:
-    """Raise HemicubeError for a hemicube that `refine` cannot start from."""
+    """Check that `refine` can start from a hemicube.
+
+    Parameters
+    ----------
+    hemicube : Hemicube
+
+    Raises
+    ------
+    HemicubeError
+        The hemicube has leaves or half sides, or a number of patches that is no power of 2.
+    """
     if hemicube.leaves or hemicube.half_sides or hemicube.patches not in LEAF_SIDES:
         raise HemicubeError(
             "only whole faces of 1, 2, 4, 8 or 16 patches a side can be refined: choose such a "
@@ -99,25 +120,46 @@ def check(hemicube: Hemicube) -> None:
 
 
 def refine(hemicube: Hemicube, probe: NDArray, samples: float, most: int) -> Hemicube:
-    """A hemicube whose patches are where a scene needs them.
+    """Make a hemicube whose patches are small where a scene needs it.
 
-    hemicube: a grid of 1, 2, 4, 8 or 16 patches a side, whole faces; probe: (F * 16 * 16, h, w, 3)
-    reflection coefficients of the same faces cut 16x16, row by row; samples: of the probe, whose
-    noise is not taken for detail; most: as many patches at the most. Every direction keeps a patch:
-    the field stays right for light that the probe did not see. Raises HemicubeError.
+    Every direction keeps a patch, so the field is also right for light that the probe did not see.
+
+    Parameters
+    ----------
+    hemicube : Hemicube
+        A grid of 1, 2, 4, 8 or 16 patches a side, of whole faces.
+    probe : (F * 16 * 16, h, w, 3) float
+        Reflection coefficients of the faces cut 16 x 16, row by row.
+    samples : float
+        Samples a pixel of the probe. They determine its noise, which must not count as detail.
+    most : int
+        The most patches.
+
+    Returns
+    -------
+    Hemicube
+
+    Raises
+    ------
+    HemicubeError
+        As `check`, or the probe has another number of patches.
+
+    Source
+    ------
+    Paper 9, adaptive patches as future work.
     """
     check(hemicube)
     faces = len(hemicube.faces)
     if probe.shape[0] != faces * FINEST**2:
         raise HemicubeError(f"a probe of {probe.shape[0]} patches, not {faces * FINEST**2}")
     light = channel_sum(probe).reshape(faces, FINEST, FINEST, -1)
-    # a broken material's pixels tell nothing; the capture itself will name them
+    # pixels of a broken material tell nothing here; the capture itself reports them
     light = light[..., np.isfinite(light).all(axis=(0, 1, 2))]
     total = light.sum(axis=(0, 1, 2))
     lit = total > 1e-3 * total.mean() if total.any() else np.zeros(total.shape, bool)
     if not lit.any():
         return hemicube
-    # relative to each pixel, as errors are counted; a path of a sample carries about 1/samples
+    # relative to each pixel, as errors are; the path of a sample carries about 1/samples
     light = light[..., lit] / total[lit]
     noise = light.sum(axis=-1) / samples
     costs = [_Costs(t, n) for t, n in zip(light, noise, strict=True)]
@@ -147,7 +189,7 @@ def refine(hemicube: Hemicube, probe: NDArray, samples: float, most: int) -> Hem
 
 
 def _join(kept: set[tuple[int, int, int, int]], costs: list[_Costs]) -> None:
-    """Put four patches together, in place, wherever nothing is lost by it."""
+    """Join four patches, in place, wherever this loses nothing."""
     for n in (FINEST // 2, FINEST // 4, FINEST // 8, FINEST // 16):
         for f, cost in enumerate(costs):
             for row in range(n):

@@ -1,4 +1,12 @@
-"""One seed of a tile: the files of a render that holds every patch and pattern once."""
+"""One seed of a tile: the files of a render that holds every patch and pattern once.
+
+Examples
+--------
+>>> _within(np.array([0.0, 1.0], np.float32).view(np.int32))
+True
+>>> [_within(np.array([x], np.float32).view(np.int32)) for x in (-1.0, np.inf, np.nan)]
+[False, False, False]
+"""
 
 from __future__ import annotations
 
@@ -16,14 +24,26 @@ from ..patterns import PatternSet
 from .names import COMBINED, GRAIN, GROUP, GUIDES, OWN_GROUP, is_combined, own_layer
 from .tile_data import Around
 
-# What is left of Combined when the groups are taken away, as a share of them, when there is no
-# other light: float32 sums of a few hundred passes.
+# What remains of Combined without the light groups, as a share of them, where there is no other
+# light. It is the rounding of float32 sums over a few hundred passes.
 ROUNDING = 3e-5
 
 
 @dataclass(frozen=True)
 class Expected:
-    """What the files of each seed of a tile must hold."""
+    """What the files of each seed of a tile must hold.
+
+    Parameters
+    ----------
+    folder : Path
+        The capture set's folder.
+    shape : tuple of int
+        (height, width) of the tile.
+    hemicube : Hemicube
+    patterns : PatternSet
+    grain : bool
+        Whether there is a grain for each patch, see `names.GRAIN`.
+    """
 
     folder: Path
     shape: tuple[int, int]
@@ -33,7 +53,25 @@ class Expected:
 
 
 class Seed:
-    """The files of one seed: every patch and pattern once."""
+    """The opened files of one seed.
+
+    Parameters
+    ----------
+    of : Expected
+    share : float
+        The seed's share of the samples, 0 to 1.
+    names : list of str
+        The names of its files.
+    opened : ExitStack
+        Closes the files.
+
+    Raises
+    ------
+    CaptureSetError
+        A basis image is missing, there twice, or not expected.
+    ExrError
+        A file cannot be read.
+    """
 
     def __init__(self, of: Expected, share: float, names: list[str], opened: ExitStack) -> None:
         self.of, self.share = of, share
@@ -74,7 +112,23 @@ class Seed:
         self._looked: set[tuple[int, str]] = set()
 
     def image(self, k: int, pattern: str) -> NDArray[np.float32]:
-        """(h, w, 3)."""
+        """Read a basis image.
+
+        Parameters
+        ----------
+        k : int
+            The number of the patch.
+        pattern : str
+
+        Returns
+        -------
+        (h, w, 3) float32
+
+        Raises
+        ------
+        CaptureSetError
+            The image has a wrong size or type, or pixels that are negative or not finite.
+        """
         number, layer = self.there[k, pattern]
         pixels = self.files[number].read(layer)
         self.files[number].let_go(layer)
@@ -84,7 +138,21 @@ class Seed:
         return pixels
 
     def images(self, k: int) -> NDArray[np.float32]:
-        """(P, h, w, 3)."""
+        """Read the basis images of a patch.
+
+        Parameters
+        ----------
+        k : int
+
+        Returns
+        -------
+        (P, h, w, 3) float32
+
+        Raises
+        ------
+        CaptureSetError
+            As `image`.
+        """
         out = np.empty((len(self.of.patterns), *self.of.shape, 3), np.float32)
         for image, name in zip(out, self.of.patterns.patterns, strict=True):
             number, layer = self.there[k, name]
@@ -96,11 +164,22 @@ class Seed:
                     self._check(number, layer, image, image.shape)
                     self._looked.add((k, name))
             else:
-                self.image(k, name)  # which says what is wrong
+                self.image(k, name)  # raises the error that says what is wrong
         return out
 
     def images_at(self, k: int, pixels: NDArray[np.intp]) -> NDArray[np.float32]:
-        """(P, n, 3)."""
+        """Read the basis images of a patch in some pixels, without checking them again.
+
+        Parameters
+        ----------
+        k : int
+        pixels : (n,) int
+            Numbers of pixels, row by row.
+
+        Returns
+        -------
+        (P, n, 3) float32
+        """
         out = np.empty((len(self.of.patterns), len(pixels), 3), np.float32)
         at = np.divmod(pixels, self.of.shape[1])
         for image, name in zip(out, self.of.patterns.patterns, strict=True):
@@ -111,17 +190,41 @@ class Seed:
         return out
 
     def add(self, k: int, images: NDArray, lit: NDArray) -> None:
-        """Add what of a patch's light is in the first file to `lit`, (h, w, 3) float64."""
+        """Add the light of a patch that is in the first file.
+
+        Parameters
+        ----------
+        k : int
+        images : (P, h, w, 3) float32
+            The patch's basis images.
+        lit : (h, w, 3) float64
+            The sum so far; changed in place.
+        """
         names = self.of.patterns.patterns
         here = [i for i, name in enumerate(names) if self.there[k, name][0] == 0]
         if here:
-            # float64, but for the few images of one patch, which numpy adds faster as they are
+            # the sum is float64; the few images of one patch are first added in float32, faster
             lit += images[here].sum(axis=0) if len(here) < len(names) else images.sum(axis=0)
         if self.of.grain and self.there[k, GRAIN][0] == 0:
             lit += self.image(k, GRAIN)
 
     def around(self, lit: NDArray) -> Around:
-        """See `BasisImages.around`; lit: the light of all patches in the first file."""
+        """Read what is around the basis images, see `BasisImages.around`.
+
+        Parameters
+        ----------
+        lit : (h, w, 3) float64
+            The light of all patches in the first file, which is subtracted from its Combined.
+
+        Returns
+        -------
+        Around
+
+        Raises
+        ------
+        CaptureSetError
+            As `image`.
+        """
         number, layer = self.others[COMBINED]
         combined = self.files[number].read(layer)
         self._check(number, layer, combined, (*self.of.shape, 4))
@@ -135,7 +238,7 @@ class Seed:
         return Around(np.maximum(own, 0).astype(np.float32), combined[..., 3], guides)
 
     def _check(self, number: int, layer: str, pixels: NDArray, shape: tuple[int, ...]) -> None:
-        """Raise CaptureSetError for whatever would bend the light."""
+        """Raise CaptureSetError for an image that would falsify the light."""
         say = f"{self.files[number].path}, '{layer}'"
         if pixels.shape != shape:
             raise CaptureSetError(
@@ -148,7 +251,7 @@ class Seed:
                 f"{say} is of {pixels.dtype}: half floats put a floor under small supports; "
                 "save it as 32-bit float, or capture again"
             )
-        # as whole numbers, what is negative is, and infinities and NaN are the largest: one pass
+        # a comparison of the bits finds negative numbers, infinities and NaN in one pass
         bits = pixels.view(np.int32) if pixels.flags.c_contiguous else None
         if bits is None or not _within(bits.reshape(-1)):
             bad = ~(np.isfinite(pixels) & (pixels >= 0)).all(axis=-1)
@@ -165,6 +268,8 @@ _INFINITY = int(np.float32(np.inf).view(np.int32))
 
 
 def _within(bits: NDArray[np.int32]) -> bool:
-    """Whether floats, as the whole numbers of their bits, are from 0 up and finite: compared
-    without their signs, negative ones come after all others."""
+    """Whether the floats with these bits are finite and at least 0.
+
+    Compared as unsigned numbers, negative floats, infinity and NaN come after all others.
+    """
     return bool(bits.view(np.uint32).max(initial=0) < _INFINITY)

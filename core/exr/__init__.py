@@ -1,9 +1,13 @@
-"""EXR files: the one door to them (`file`), whether all of a file is there (`layout`), and where a
-picture stands in what is delivered (`window`)."""
+"""EXR files: reading (`reading`, `layers`) and writing (`writing`) through one door (`library`).
+
+`opening` and `layout` check that all of a file is there. `window` is the place of a picture in what
+is delivered.
+"""
 
 from __future__ import annotations
 
-from .reading import Layers, header, part_names, parts, read, whole_parts, windows
+from .layers import Layers
+from .reading import header, part_names, parts, read, whole_parts, windows
 from .writing import write, write_layered, write_planes
 
 __all__ = [

@@ -1,9 +1,20 @@
-"""The layout of an EXR file's bytes: whether all is there that its headers say, before it is read.
+"""The layout of an EXR file's bytes: whether everything is there that its headers announce.
 
-The library reads what is left of a truncated file and fills the rest, and takes a header at its
-word when it makes room. Here a file is whole when every chunk of every part lies inside it, with a
-size that its pixels can have. Nothing is decoded. Layout: magic, version, headers, a table of chunk
-offsets for each part, chunks. Source: the file layout of the OpenEXR documentation.
+The OpenEXR library reads what is left of a truncated file and fills in the rest, and it allocates
+whatever a header asks for. Here a file counts as whole when every chunk of every part lies inside
+it and has a size that its pixels can have. Nothing is decoded. The layout is: magic number,
+version, headers, a table of chunk offsets for each part, chunks.
+
+Examples
+--------
+>>> check(b"no picture")
+Traceback (most recent call last):
+...
+arto.core.exr.layout.LayoutError: it is no EXR file
+
+Source
+------
+OpenEXR documentation, "OpenEXR File Layout".
 """
 
 from __future__ import annotations
@@ -17,7 +28,7 @@ from numpy.typing import NDArray
 
 from .window import PICTURE
 
-# No name in a header is longer, and no picture larger.
+# The longest name in a header, and the largest side of a picture.
 _LONGEST_TEXT = 256
 _LARGEST = 1 << 17
 _MOST_ATTRIBUTES = 4096
@@ -26,20 +37,20 @@ _MOST_ATTRIBUTES = 4096
 _LINES = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256, 256, 32)
 _NONE = 0
 _UINT = 0
-# Bytes that one byte of a chunk may stand for: deflate's limit, and what flat pictures come to in
-# the others.
+# The most bytes of pixels for one byte of a chunk: the limit of deflate, and for the other
+# compressions what pictures of one colour reach.
 _MOST_PACKED = {1: 130, 2: 1100, 3: 1100, 5: 1100}
 _MOST_PACKED_ELSE = 1 << 15
 _PIXEL_BYTES = {0: 4, 1: 2, 2: 4}
 
 
 class LayoutError(Exception):
-    """What is wrong with the file, in a few words."""
+    """A file whose bytes are not those of a whole EXR file. The message says why, briefly."""
 
 
 @dataclass(frozen=True)
 class _Part:
-    """What of a header decides where its chunks are."""
+    """The values of a header that decide where the chunks of its part are."""
 
     name: str
     width: int
@@ -56,10 +67,18 @@ class _Part:
 
 @dataclass(frozen=True)
 class PlainPart:
-    """A part whose lines lie in the file as they are, one after the other.
+    """A part whose lines of pixels lie in the file uncompressed, one after the other.
 
-    channels: name and kind (1 half, 2 float) of each, in the order that they have in a line;
-    offset: where the first line's pixels begin; stride: from a line to the next, in bytes.
+    Parameters
+    ----------
+    name : str
+    width, height : int
+    channels : tuple of (str, int)
+        Name and kind (1 half, 2 float) of each channel, in their order within a line.
+    offset : int
+        The byte at which the pixels of the first line begin.
+    stride : int
+        Bytes from a line to the next.
     """
 
     name: str
@@ -71,13 +90,44 @@ class PlainPart:
 
 
 def check(data: mmap.mmap | bytes) -> int:
-    """How many parts the file has. Raises LayoutError for one that is not whole."""
+    """Check that a file is whole.
+
+    Parameters
+    ----------
+    data : mmap or bytes
+        The bytes of the file.
+
+    Returns
+    -------
+    int
+        The number of its parts.
+
+    Raises
+    ------
+    LayoutError
+        The file is truncated, damaged, deep, or no EXR file.
+    """
     return len(_checked(data)[0])
 
 
 def plain(data: mmap.mmap | bytes) -> list[PlainPart] | None:
-    """The parts of a file whose pixels may be read where they lie; None where any is packed, tiled,
-    out of order, or not all of the picture. Raises LayoutError for a file that is not whole."""
+    """Find the parts of a file whose pixels can be read where they lie.
+
+    Parameters
+    ----------
+    data : mmap or bytes
+        The bytes of the file.
+
+    Returns
+    -------
+    list of PlainPart or None
+        None where a part is compressed, tiled, out of order, or has not all pixels of the picture.
+
+    Raises
+    ------
+    LayoutError
+        As `check`.
+    """
     parts, tables, leader = _checked(data)
     found = []
     for part, table in zip(parts, tables, strict=True):
@@ -88,7 +138,7 @@ def plain(data: mmap.mmap | bytes) -> list[PlainPart] | None:
         if any(kind == _UINT for _, kind in part.channels):
             return None
         first = int(table[0])
-        # each line says how long it is, and which one: the first is enough where all are alike
+        # each line begins with its number and its length; all lines have the length of the first
         if struct.unpack_from("<I", data, first + leader)[0] != stride - leader - 4:
             return None
         offset = first + leader + 4
@@ -115,14 +165,22 @@ def _checked(data: mmap.mmap | bytes) -> tuple[list[_Part], list[NDArray], int]:
     for number, (part, table) in enumerate(zip(parts, tables, strict=True)):
         _check_chunks(data, part, table, at, number if multipart else None)
         if len(table) and isinstance(data, mmap.mmap):
-            # a word of each chunk was looked at, and all of the file would stay in memory
+            # the check read a word of each chunk, which would keep all of the file in memory
             forget(data, int(table.min()), int(table.max()))
     return parts, tables, 8 if multipart else 4
 
 
 def forget(data: mmap.mmap, start: int, end: int) -> None:
-    """Give back the pages that lie in a stretch of a mapped file; they are read again when asked
-    for. Systems that have no such call do so by themselves when memory is short."""
+    """Give back the memory of a stretch of a mapped file; it is read again when it is needed.
+
+    Systems without such a call free the memory by themselves when they are short of it.
+
+    Parameters
+    ----------
+    data : mmap
+    start, end : int
+        The stretch in bytes.
+    """
     first = -(-start // mmap.PAGESIZE) * mmap.PAGESIZE
     length = min(end, len(data)) // mmap.PAGESIZE * mmap.PAGESIZE - first
     if length > 0 and hasattr(data, "madvise"):
@@ -201,7 +259,7 @@ def _part(attributes: dict[bytes, bytes], multipart: bool, tiled: bool) -> _Part
     if chunks is None or chunks < 1 or (multipart and said_chunks not in (None, chunks)):
         raise LayoutError("its number of chunks is not that of its pixels")
     name = attributes.get(b"name", b"").rstrip(b"\0").decode("utf-8", "replace")
-    # of what has no display window the library says that itself
+    # the library itself reports a missing display window
     whole = attributes.get(b"displayWindow") in (None, attributes[b"dataWindow"])
     whole &= PICTURE.encode() not in attributes
     return _Part(
@@ -210,7 +268,7 @@ def _part(attributes: dict[bytes, bytes], multipart: bool, tiled: bool) -> _Part
 
 
 def _channels(data: bytes) -> tuple[tuple[tuple[str, int], ...], bool]:
-    """Name and kind of each channel, and whether any has not all pixels."""
+    """Name and kind of each channel, and whether one of them is subsampled."""
     found, at, sampled = [], 0, False
     while True:
         name, at = _text(data, at)
@@ -228,7 +286,7 @@ def _channels(data: bytes) -> tuple[tuple[tuple[str, int], ...], bool]:
 
 
 def _tile_count(width: int, height: int, tile_width: int, tile_height: int, mode: int) -> int:
-    """Tiles of all levels of a part."""
+    """The number of tiles of all levels of a part."""
     if tile_width < 1 or tile_height < 1:
         raise LayoutError("its tiles have no size")
     levels, up = mode & 15, mode >> 4
@@ -260,9 +318,9 @@ def _tile_count(width: int, height: int, tile_width: int, tile_height: int, mode
 def _check_chunks(
     data: mmap.mmap | bytes, part: _Part, table: NDArray, first: int, number: int | None
 ) -> None:
-    """Raise LayoutError unless every chunk of a part is there, of a size that it can have.
+    """Raise LayoutError unless every chunk of a part is there and has a possible size.
 
-    first: where the chunks begin; number: of the part, None in a file of one.
+    first: the byte at which the chunks begin; number: of the part, None in a file of one part.
     """
     size = len(data)
     leader = (4 if number is not None else 0) + (16 if part.tiles else 4)
@@ -271,7 +329,7 @@ def _check_chunks(
         raise LayoutError("chunks of it are missing")
 
     def number_at(places: NDArray) -> NDArray[np.int64]:
-        # a copy of what is there: a view of a mapped file would keep it open
+        # the numbers are copied, because a view would keep the mapped file open
         view = np.frombuffer(data, np.uint8)
         found = sum(view.take(places + i).astype(np.int64) << 8 * i for i in range(4))
         del view

@@ -1,9 +1,21 @@
-"""Where a picture stands in what is delivered: the display and the data window of an EXR file.
+"""The place of a picture in what is delivered: the display and the data window of an EXR file.
 
-The display window is what is delivered; the data window is what pixels there are. A picture may
-have more at its edges (overscan), for what a lens bends or a shake moves in, and it may be empty
-where nothing stands, which need not be in the file. ARTO's own files also say which pixels the
-picture had, so that what was cut off as empty comes back as it was.
+The display window is the delivered picture. The data window has the pixels that the file holds. A
+picture may have more pixels at its edges (overscan), for lens distortion and camera shake, and
+empty edges need not be in the file. ARTO's own files also say how large the picture was, so that
+edges that were cropped as empty come back as they were.
+
+Examples
+--------
+>>> plane = np.zeros((6, 8), np.float32)
+>>> plane[2, 3] = 1.0
+>>> parts, head = Window(overscan=1, crop=True).put([("", {"Y": plane})])
+>>> parts[0][1]["Y"].shape, box_of(head["displayWindow"]), box_of(head["dataWindow"])
+((1, 1), (0, 0, 5, 3), (2, 1, 2, 1))
+
+Source
+------
+OpenEXR documentation, "Technical Introduction to OpenEXR", overscan and windows.
 """
 
 from __future__ import annotations
@@ -17,10 +29,10 @@ from numpy.typing import NDArray
 
 from ..errors import ExrError
 
-# An attribute of ours: the box of all of the picture, which overscan puts beyond the display window
-# and a crop beyond the data window.
+# ARTO's own attribute: the box of the whole picture. With overscan it is larger than the display
+# window, with a crop it is larger than the data window.
 PICTURE = "arto.picture"
-# No display window that makes a picture of more pixels is believed: most of it would be empty.
+# A display window that makes a larger picture is taken for damage: most of it would be empty.
 _MOST_PIXELS = 1 << 27
 # Cycles' depth where a ray meets nothing.
 NO_HIT = 1e10
@@ -31,17 +43,32 @@ Part = tuple[str, dict[str, NDArray]]
 
 @dataclass(frozen=True)
 class Window:
-    """How pictures stand in their files.
+    """The place of pictures in their files.
 
-    overscan: pixels at each edge that they have beyond what is delivered; crop: whether only what
-    is not empty is written.
+    Parameters
+    ----------
+    overscan : int
+        Pixels at each edge beyond the delivered picture.
+    crop : bool
+        Whether empty edges are left out of the file.
     """
 
     overscan: int = 0
     crop: bool = False
 
     def check(self, shape: tuple[int, int]) -> None:
-        """Raise ExrError where a picture (H, W) has no such overscan."""
+        """Check that a picture is large enough for the overscan.
+
+        Parameters
+        ----------
+        shape : tuple of int
+            (H, W) of the picture, overscan included.
+
+        Raises
+        ------
+        ExrError
+            Nothing of the picture would be left.
+        """
         height, width = shape
         if self.overscan < 0:
             raise ExrError(f"an overscan of {self.overscan} pixels cannot be: 0 is none")
@@ -53,7 +80,25 @@ class Window:
             )
 
     def put(self, parts: Sequence[Part]) -> tuple[list[Part], dict[str, Any]]:
-        """Parts of one file, all of a size, as they are written, and what their header says."""
+        """Prepare the parts of a file for writing.
+
+        Parameters
+        ----------
+        parts : sequence of (str, dict of str to (H, W) array)
+            The name and the channels of each part, all of one size.
+
+        Returns
+        -------
+        parts : list
+            The same, cropped.
+        head : dict
+            The windows, for the header.
+
+        Raises
+        ------
+        ExrError
+            As `check`.
+        """
         shape = next(iter(parts[0][1].values())).shape
         self.check(shape)
         if not self.overscan and not self.crop:
@@ -79,9 +124,12 @@ FULL = Window()
 
 
 def _something(planes: Sequence[tuple[str, NDArray]], overscan: int) -> tuple[int, int, int, int]:
-    """The first and last row and column in which any plane, by its channel's name, is not 0, and no
-    depth of nothing; of empty ones those of the first pixel that is delivered, as no file is
-    without pixels."""
+    """The first and last row and column that are not empty.
+
+    A pixel is empty if all its channels are 0; a depth (channel Z) is also empty where no ray hit
+    anything. Of an empty picture this is the first delivered pixel, because a file must have
+    pixels.
+    """
     shape = planes[0][1].shape
     rows, columns = np.zeros(shape[0], bool), np.zeros(shape[1], bool)
     for name, plane in planes:
@@ -97,15 +145,27 @@ def _something(planes: Sequence[tuple[str, NDArray]], overscan: int) -> tuple[in
 
 
 def _written(box: Box) -> tuple[NDArray, NDArray]:
-    """A box as the library has it."""
+    """A box as the OpenEXR library has it."""
     return np.array(box[:2], np.int32), np.array(box[2:], np.int32)
 
 
 def place(heads: Sequence[dict[str, Any]], parts: Sequence[dict[str, NDArray]]) -> None:
-    """Put the channels of each part of a file into the whole picture, in `parts`: all that is in
-    its display window, and all that is in the data window of any part. 0 where there is nothing.
+    """Put the channels of each part of a file into the whole picture, in place.
 
-    Raises ExrError for windows of a damaged header.
+    The whole picture is the display window and all data windows together. It is 0 where the file
+    has no pixels.
+
+    Parameters
+    ----------
+    heads : sequence of dict
+        The header of each part.
+    parts : sequence of dict of str to (H, W) array
+        The channels of each part; changed in place.
+
+    Raises
+    ------
+    ExrError
+        The windows are those of a damaged header.
     """
     data = [box_of(head["dataWindow"]) for head in heads]
     others = [box_of(head[PICTURE]) for head in heads if PICTURE in head]
@@ -127,13 +187,23 @@ def place(heads: Sequence[dict[str, Any]], parts: Sequence[dict[str, NDArray]]) 
 
 
 def box_of(found: Any) -> Box:
-    """A box as ARTO has it."""
+    """Turn a box of the OpenEXR library into a tuple.
+
+    Parameters
+    ----------
+    found : pair of pairs of int
+
+    Returns
+    -------
+    Box
+        x0, y0, x1, y1, the last two included.
+    """
     (x0, y0), (x1, y1) = (tuple(int(v) for v in corner) for corner in found)
     return x0, y0, x1, y1
 
 
 def _around(boxes: Sequence[Box]) -> Box:
-    """What is around boxes; those that are none count for nothing."""
+    """The smallest box around some boxes; boxes without pixels are left out."""
     some = [b for b in boxes if b[2] >= b[0] and b[3] >= b[1]]
     x0, y0 = (min(b[i] for b in some) for i in (0, 1))
     x1, y1 = (max(b[i] for b in some) for i in (2, 3))

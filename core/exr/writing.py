@@ -1,4 +1,16 @@
-"""Writing EXR files, whole or not at all."""
+"""Writing EXR files, whole or not at all.
+
+Examples
+--------
+>>> import tempfile
+>>> from arto.core.exr.reading import part_names
+>>> folder = tempfile.TemporaryDirectory()
+>>> path = Path(folder.name) / "plate.exr"
+>>> write_layered(path, np.zeros((2, 2, 4)), {"sky": np.zeros((2, 2, 3))})
+>>> sorted(part_names(path))
+['', 'sky']
+>>> folder.cleanup()
+"""
 
 from __future__ import annotations
 
@@ -11,7 +23,7 @@ from numpy.typing import NDArray
 from ..errors import ExrError
 from ..files import whole
 from .library import openexr
-from .reading import check_complete
+from .opening import check_complete
 from .window import FULL, Window
 
 # What a colour space is called in an EXR header (colorInteropID), by Blender's name for it.
@@ -30,10 +42,25 @@ def write(
     colour_space: str = "Linear Rec.709",
     window: Window = FULL,
 ) -> None:
-    """Write layers, (H, W, 3), (H, W, 4) or (H, W), each as a part of its own; ZIP, as they are.
+    """Write layers, each as a part of its own, with ZIP compression.
 
-    A single layer named '' makes an ordinary one-part image. The file appears whole or not at all.
-    Raises ExrError if the folder cannot be written or the disk is full, or of the window.
+    A single layer of the name '' makes an ordinary file of one part.
+
+    Parameters
+    ----------
+    path : Path
+    layers : dict of str to (H, W), (H, W, 3) or (H, W, 4) array
+        float16 is written as half, all else as float32.
+    attributes : dict, optional
+        For the header.
+    colour_space : str
+        Blender's name of the space of the pixels.
+    window : Window
+
+    Raises
+    ------
+    ExrError
+        The folder cannot be written, the disk is full, or the window does not fit the picture.
     """
     parts = [(name, _channels(pixels)) for name, pixels in layers.items()]
     _write(path, parts, attributes, colour_space, window)
@@ -45,8 +72,22 @@ def write_planes(
     attributes: dict[str, Any],
     window: Window = FULL,
 ) -> None:
-    """Write data, planes (H, W) by the names of their channels in parts of theirs, as 32-bit
-    floats. Raises ExrError as `write`."""
+    """Write data that is no colour, as planes of 32-bit floats in parts.
+
+    Parameters
+    ----------
+    path : Path
+    parts : dict of str to dict of str to (H, W) array
+        The planes by the names of their channels, by the names of their parts.
+    attributes : dict
+        For the header.
+    window : Window
+
+    Raises
+    ------
+    ExrError
+        As `write`.
+    """
     planes = {
         part: {name: np.ascontiguousarray(p, np.float32) for name, p in channels.items()}
         for part, channels in parts.items()
@@ -62,10 +103,26 @@ def write_layered(
     colour_space: str = "Linear Rec.709",
     window: Window = FULL,
 ) -> None:
-    """Write a picture (H, W, 4) and layers of it, (H, W, 3) each, into one part: the picture as
-    plain R, G, B, A, the layers as `name.R` and so on, as compositing programs look for them.
+    """Write a picture and layers of it into one part, as compositing programs expect.
 
-    Raises ExrError as `write`.
+    The channels of the picture are R, G, B, A, those of a layer `name.R` and so on.
+
+    Parameters
+    ----------
+    path : Path
+    beauty : (H, W, 4) array
+        The picture, scene-linear, premultiplied.
+    layers : dict of str to (H, W, 3) array
+    attributes : dict, optional
+        For the header.
+    colour_space : str
+        Blender's name of the space of the pixels.
+    window : Window
+
+    Raises
+    ------
+    ExrError
+        As `write`.
     """
     channels = _channels(beauty)
     for name, pixels in layers.items():

@@ -1,1 +1,1 @@
-"""Which model the light of a pixel gets: evidence, choice and search, tile by tile (paper 5)."""
+"""The support model of each pixel and patch: evidence, choice, search and fit (paper 5)."""

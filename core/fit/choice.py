@@ -1,20 +1,25 @@
-"""Which support model each pixel and patch gets: the smallest that explains its light.
+"""The choice of a support model for each pixel and patch: the smallest that explains its light.
 
-The candidates nest: nothing, the whole patch, the linear projection, the box. How many independent
-light paths an entry had is known from the capture's grain, and decides how its moments are read:
+The candidates nest: nothing, the whole patch, the linear projection, the box. The capture's grain
+tells how many independent light paths an entry had, which decides how its moments are read:
 
-- A *box* must be shown. Its spread must explain the moments better than a linear density's by more
-  than two parameters would by chance: Akaike's criterion with the correction for few samples
-  (AICc). Two points in a patch are no evidence of a narrow support, however often one was hit.
-- The *whole patch* must be shown too: that the light's mean is that of the patch, seen evenly by
-  solid angle, to `CENTRED`. A mean that is not known is kept as it is, in the linear projection.
-  That is noise, but unbiased noise, which averages out over pixels and can be denoised; a mean
-  rounded to the middle stays wrong.
-- Enough evidence still does not make a box the better filter. A reflection that is narrow both ways
-  is one; what is broad, or narrow one way only, is mostly a diffuse view of a patch that something
-  hides in part, and there a box lets a sun in or shuts it out by its edge's last digit, while the
-  linear projection errs by little. Where one overtakes the other was measured, on two scenes and
-  eight HDRIs (docs/measurements.md).
+- A *box* needs evidence. Its spread must explain the moments better than a linear density, by more
+  than two parameters gain by chance (Akaike's criterion with the correction for few samples, AICc).
+  Two points in a patch are no evidence of a narrow support, however often one was hit.
+- The *whole patch* needs evidence too: the mean of the light must be that of a patch seen evenly
+  by solid angle, to `CENTRED`. An uncertain mean is kept as it is, in the linear projection. That
+  is unbiased noise, which averages out over pixels and can be denoised. A mean that is rounded to
+  the middle stays wrong.
+- A box with enough evidence may still be the worse filter. Reflection that is narrow both ways is
+  a box. Reflection that is broad, or narrow one way only, is mostly a diffuse view of a patch that
+  something hides in part. There the edge of a box lets a sun in or shuts it out by its last digit,
+  while the linear projection errs by little. `BROAD` was measured on two scenes and eight HDRIs
+  (docs/measurements.md).
+
+Examples
+--------
+>>> [round(float(price), 2) for price in _aicc(2, np.array([5.0, 100.0, np.inf]))]
+[10.0, 4.12, 4.0]
 """
 
 from __future__ import annotations
@@ -32,18 +37,33 @@ from .evidence import Evidence
 SEARCH = "search"
 STAGE_AND_MATTE = "stage_and_matte"
 CHOICES = ("auto", *SUPPORTS, SEARCH, STAGE_AND_MATTE)
-# A mean this near to the whole patch's, its own uncertainty included, is the whole patch's.
+# The largest distance, uncertainty included, at which a mean counts as the whole patch's.
 CENTRED = 0.02
 # Half width, of the patch, from which on the linear projection beats the box.
 BROAD = 0.35
-# How far the root of three variances may be off a box's half width of `BROAD`, relative: on a patch
-# as large as a face it is a tenth.
+# The largest relative difference between the root of three variances and a half width of `BROAD`.
+# On a patch as large as a face it is a tenth.
 BENT = 0.15
 
 
 def check(choice: str, patterns: PatternSet, separate: bool = False) -> None:
-    """Raise a typed error if `choice` is unknown, has no supports for each channel where those are
-    asked for (`separate`), or cannot be identified from the patterns."""
+    """Check that a choice can be fitted.
+
+    Parameters
+    ----------
+    choice : str
+        One of `CHOICES`.
+    patterns : PatternSet
+    separate : bool
+        Whether each channel gets a support of its own.
+
+    Raises
+    ------
+    FieldError
+        There is no such choice, or it has no supports for each channel.
+    PatternError
+        The patterns do not identify its moments.
+    """
     if choice not in CHOICES:
         raise FieldError(f"no support model '{choice}': choose one of {', '.join(CHOICES)}")
     if separate and choice in (SEARCH, STAGE_AND_MATTE):
@@ -62,7 +82,7 @@ def check(choice: str, patterns: PatternSet, separate: bool = False) -> None:
 
 
 def _aicc(parameters: int, n: NDArray) -> NDArray:
-    """AICc's price of that many parameters from n samples."""
+    """The price of that many parameters from n samples by AICc."""
     few = n - parameters - 1
     with np.errstate(invalid="ignore", divide="ignore"):
         price = 2 * parameters * (1 + (parameters + 1) / few)
@@ -72,7 +92,7 @@ def _aicc(parameters: int, n: NDArray) -> NDArray:
 def _smallest(moments: Moments, hits: NDArray) -> NDArray[np.uint8]:
     """The codes (n,) of the smallest models that explain the moments of one patch.
 
-    Moments without spreads (NaN) leave the box out.
+    Moments without spreads (NaN) are never boxes.
     """
     n = np.maximum(hits, 1e-9)
     even = moments.uniform
@@ -89,23 +109,23 @@ def _smallest(moments: Moments, hits: NDArray) -> NDArray[np.uint8]:
 def _shown_box(
     moments: Moments, offs: list[NDArray], spreads: NDArray, n: NDArray
 ) -> NDArray[np.bool_]:
-    """Where a box is shown, and narrow enough to be the better filter -> (n,).
+    """Where the evidence shows a box that is narrow enough to be the better filter -> (n,).
 
-    offs: the means' distances from the whole patch's, along u and v; spreads: the variances of the
-    whole patch; n: hits.
+    offs: the distances of the means from the whole patch's, along u and v; spreads: the variances
+    of the whole patch; n: the numbers of hits.
     """
     spread_gain = np.zeros(len(n))
     widest = np.zeros(len(n))
     for off, variance, even in zip(offs, moments.variance, spreads, strict=True):
-        # twice the gain in log likelihood, a sample, of a spread of its own over that of a linear
-        # density, that of the whole patch less off^2
+        # twice the gain in log likelihood per sample by a spread of its own, compared with the
+        # spread of a linear density: the variance of the whole patch minus off^2
         expected = np.maximum(even - off * off, even / 4)
         ratio = np.maximum(variance / expected, 1e-9)
         spread_gain += ratio - 1 - np.log(ratio)
         np.maximum(widest, 3 * variance, out=widest)
     with np.errstate(invalid="ignore"):
         box = np.where(np.isinf(n), True, n * spread_gain > _aicc(4, n) - _aicc(2, n))
-    # the half width by the variance alone, which solid angle bends by less than `BENT`
+    # the half width by the variance alone, which is right to `BENT`
     widest = np.sqrt(widest)
     box &= widest < BROAD * (1 + BENT)
     near = np.flatnonzero(box & (widest > BROAD * (1 - BENT)))
@@ -124,11 +144,32 @@ def choose(
     extent: Extent,
     separate: bool = False,
 ) -> tuple[NDArray[np.uint8], dict[int, NDArray]]:
-    """Model codes of n pixels for patch k, and for each code in use the parameters of its pixels.
+    """Choose the models of n pixels for a patch, and fit them.
 
-    basis: (P, n, 3), the patch's images; coefficient: (n, 3) of theirs; extent: of patch k on its
-    face; choice: `auto`, or one model for every pixel that gets light from the patch; separate:
-    supports of each channel's own.
+    Parameters
+    ----------
+    choice : str
+        `auto`, or one model for every pixel that gets light from the patch.
+    basis : (P, n, 3) float
+        The patch's basis images.
+    coefficient : (n, 3) float
+        The reflection coefficients.
+    patterns : PatternSet
+    known : Evidence
+        Of the tile.
+    k : int
+        The number of the patch.
+    extent : tuple of 4 float
+        Its place on its face.
+    separate : bool
+        Whether each channel gets a support of its own.
+
+    Returns
+    -------
+    codes : (n,) uint8
+        The code of each pixel's model.
+    parameters : dict of int to (m, p) float
+        For each code in use, the parameters of its m pixels.
     """
     lit = entries(choice, coefficient, known, k)
     codes = np.full(len(coefficient), NOTHING, np.uint8)
@@ -137,10 +178,22 @@ def choose(
 
 
 def entries(choice: str, coefficient: NDArray, known: Evidence, k: int) -> NDArray[np.intp]:
-    """The pixels in which patch k is an entry under a choice; coefficient: (n, 3)."""
+    """Find the pixels in which a patch is an entry under a choice.
+
+    Parameters
+    ----------
+    choice : str
+    coefficient : (n, 3) float
+    known : Evidence
+    k : int
+
+    Returns
+    -------
+    (m,) int
+    """
     if choice == "auto":
-        # most entries are too dark to keep: what they see of their patch is not asked for, and
-        # their light goes into the pixel's rest
+        # most entries are too dark to keep: they get no support, and their light goes into the
+        # pixel's rest
         return known.kept(k)
     return np.flatnonzero((coefficient > 0).any(axis=-1))
 
@@ -155,7 +208,26 @@ def choose_lit(
     extent: Extent,
     separate: bool = False,
 ) -> tuple[NDArray[np.uint8], dict[int, NDArray]]:
-    """`choose` for those pixels of patch k that are `entries`; basis: (P, n, 3) of them."""
+    """Choose and fit as `choose` does, for those pixels of a patch that are `entries`.
+
+    Parameters
+    ----------
+    choice : str
+    basis : (P, m, 3) float
+        The basis images in these pixels.
+    patterns : PatternSet
+    known : Evidence
+    k : int
+    pixels : (m,) int
+        The numbers of the pixels.
+    extent : tuple of 4 float
+    separate : bool
+
+    Returns
+    -------
+    codes : (m,) uint8
+    parameters : dict of int to (n, p) float
+    """
     moments = Moments.from_basis(basis, patterns, extent, separate)
     if choice == "auto":
         codes = _smallest(moments, known.hits(k, pixels))

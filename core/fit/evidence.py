@@ -1,7 +1,14 @@
-"""Evidence: how far what was captured can be believed, before a model is chosen by it.
+"""Evidence: how far a capture can be believed, before a model is chosen by it.
 
-How many independent light paths an entry had decides what its moments say; how small an entry is
-beside its pixel's others, whether it is kept at all.
+The number of independent light paths of an entry decides how reliable its moments are. The size of
+an entry beside the others of its pixel decides whether it is kept.
+
+Examples
+--------
+>>> sizes = np.array([[1.0], [0.0002]], np.float32)  # two patches, one pixel
+>>> found = evidence(sizes, (1, 1), np.array([0.1, 0.1]), samples=64)
+>>> found.kept(0).tolist(), found.kept(1).tolist()
+([0], [])
 """
 
 from __future__ import annotations
@@ -13,14 +20,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-# Entries are dropped into the pixel's rest, smallest first, while what is dropped stays under this
-# share of the pixel's light.
+# Entries are dropped into the pixel's rest, the smallest first, up to this share of its light.
 DROPPED = 1e-3
-# But for an entry that a sun could make more than this share of its pixel: one that gives as much
-# light as a whole even sky, pi, and all of it on that entry's patch. Small patches are what that is
-# about, where a sun is a thousand times the sky.
+# An entry is kept if a sun on its patch could make it more than this share of its pixel. The sun is
+# taken to give as much light as a whole even sky (pi). This concerns small patches, on which a sun
+# is a thousand times brighter than the sky.
 SUN = 0.01
-# Pixels whose entries are sorted at a time: as many as fit the cache with their patches.
+# Pixels whose entries are sorted at a time, so that they fit the cache.
 BLOCK = 2048
 # Pixels along the side of the window that an entry's noise is measured in.
 WINDOW = 5
@@ -28,12 +34,24 @@ WINDOW = 5
 
 @dataclass(frozen=True)
 class Evidence:
-    """How far the moments of a tile can be believed, and which are too small to keep.
+    """The sizes of a tile's entries and what is known of their noise.
 
-    sizes: (K, n) coefficients, summed over channels; least: (n,) under which one is dropped; total:
-    (n,) that of all patches; shape: (h, w) of the tile, n = h x w; solid_angles: (K,) of the
-    patches; samples: samples a pixel of the capture, None without noise (photographs); grain: of
-    patch k, (h, w), see `capture.names.GRAIN`.
+    Parameters
+    ----------
+    sizes : (K, n) float32
+        The coefficients, summed over channels.
+    least : (n,) float32
+        The size below which an entry is dropped.
+    total : (n,) float32
+        The sum of all sizes of a pixel.
+    shape : tuple of int
+        (h, w) of the tile, n = h x w.
+    solid_angles : (K,) float
+        Of the patches, in steradians.
+    samples : float, optional
+        Samples a pixel of the capture; None for images without noise, such as photographs.
+    grain : callable, optional
+        Gives the grain (h, w) of a patch by its number, see `capture.names.GRAIN`.
     """
 
     sizes: NDArray[np.float32]
@@ -45,19 +63,38 @@ class Evidence:
     grain: Callable[[int], NDArray | None] | None = None
 
     def kept(self, k: int) -> NDArray[np.intp]:
-        """The pixels in which patch k is an entry."""
+        """Find the pixels in which a patch is kept as an entry.
+
+        Parameters
+        ----------
+        k : int
+
+        Returns
+        -------
+        (m,) int
+        """
         size = self.sizes[k]
         under_a_sun = np.float32(SUN * self.solid_angles[k] / np.pi) * self.total
         # one comparison: what is kept is the lesser of the two
         return np.flatnonzero((size >= np.minimum(self.least, under_a_sun)) & (size > 0))
 
     def hits(self, k: int, pixels: NDArray[np.intp]) -> NDArray:
-        """How many equal light paths would be as noisy as what reached patch k in some pixels.
+        """Compute how many equal light paths would be as noisy as the paths from a patch to some
+        pixels.
 
-        Infinite where there is no such noise. Paths of weights w_i are as good as
-        (sum w)^2 / sum w^2 equal ones. Grain shows the sum of squares, on average: over a window of
-        pixels. Without it, hits are counted by the patch's share of the light, which takes all
-        paths for equal.
+        Paths of weights w_i are as good as (sum w)^2 / sum w^2 equal ones. The grain shows the sum
+        of squares on average, so it is summed over a window of pixels. Without grain, the paths are
+        taken for equal, and are counted by the patch's share of the light.
+
+        Parameters
+        ----------
+        k : int
+        pixels : (m,) int
+
+        Returns
+        -------
+        (m,) float
+            Infinite for images without noise.
         """
         if self.samples is None:
             return np.full(pixels.shape, np.inf)
@@ -69,7 +106,7 @@ class Evidence:
         squares = _window_sum(np.square(grain, dtype=np.float64))
         signal = _window_sum(np.square(size, dtype=np.float64).reshape(self.shape))
         found = (signal / np.maximum(squares, 1e-300)).ravel()[pixels]
-        # few grains may cancel by chance; no path counts for more than one sample
+        # a few grains may cancel by chance, and a path cannot be more than one sample
         return np.minimum(found, 2 * share + 1)
 
 
@@ -80,7 +117,21 @@ def evidence(
     samples: float | None = None,
     grain: Callable[[int], NDArray | None] | None = None,
 ) -> Evidence:
-    """What is known of a tile: see `Evidence`. sizes: (K, n), see there."""
+    """Collect what is known of a tile.
+
+    Parameters
+    ----------
+    sizes : (K, n) float32
+    shape : tuple of int
+    solid_angles : (K,) float
+    samples : float, optional
+    grain : callable, optional
+        All as in `Evidence`.
+
+    Returns
+    -------
+    Evidence
+    """
     pixels = sizes.shape[1]
     least, total = np.empty(pixels, np.float32), np.empty(pixels, np.float32)
 

@@ -1,4 +1,20 @@
-"""Fitting: from a capture set to a reflectance field, tile by tile (paper 5)."""
+"""Fitting: from a capture set to a reflectance field, tile by tile (paper 5).
+
+Examples
+--------
+>>> import tempfile
+>>> from arto.core.capture import capture_set
+>>> from arto.core.field.field import Field
+>>> from arto.core.patterns import pattern_set
+>>> folder = tempfile.TemporaryDirectory()
+>>> here, cube, white = Path(folder.name), Hemicube(patches=1), pattern_set("white")
+>>> capture_set.write(here / "captured", cube, white, np.full((6, 1, 2, 4, 3), 0.1))
+>>> for step in fit(CaptureSet(here / "captured"), here / "field", choice="whole"):
+...     pass
+>>> Field(here / "field").shares()["whole"]
+1.0
+>>> folder.cleanup()
+"""
 
 from __future__ import annotations
 
@@ -23,7 +39,7 @@ from . import choice as choices
 from .evidence import evidence
 from .search import search
 
-# How much of the work on a tile the first pass over its images is, about.
+# The approximate share of the first pass over the images in the work on a tile.
 READING = 0.4
 
 
@@ -35,11 +51,32 @@ def fit_tile(
     samples: float | None = None,
     separate: bool = False,
 ) -> Iterator[float | TileWriter]:
-    """Fit one tile: yields the share that is done, and last the tile, ready to be written.
+    """Fit one tile.
 
-    What is in memory of it at a time is one patch's images, a number for each patch and pixel, and
-    what was fitted. samples: samples a pixel of the capture, which tell how far its noise can be
-    believed (None: no noise); separate: a support for each channel.
+    In memory at a time are the images of one patch, one number for each patch and pixel, and what
+    was fitted so far.
+
+    Parameters
+    ----------
+    data : BasisImages or TileData
+    patterns : PatternSet
+    hemicube : Hemicube
+    choice : str
+        One of `choice.CHOICES`.
+    samples : float, optional
+        Samples a pixel of the capture, which determine its noise; None for no noise.
+    separate : bool
+        Whether each channel gets a support of its own.
+
+    Yields
+    ------
+    float or TileWriter
+        The share that is done; at last the tile, ready to be written.
+
+    Raises
+    ------
+    CaptureSetError
+        A basis image cannot be read.
     """
     patches = len(hemicube)
     shape = (data.region.height, data.region.width)
@@ -96,10 +133,32 @@ def fit_tile(
 def fit_into(
     captured: CaptureSet, tile: int, folder: Path
 ) -> Generator[float, None, dict[str, Any]]:
-    """Fit a tile of a capture set as its description asks, and write it into a field's folder:
-    yields the share that is done, returns the tile's entry in `field.json`.
+    """Fit a tile of a capture set as its description asks, and write it into a field's folder.
 
-    Raises CaptureSetError, FieldError.
+    Parameters
+    ----------
+    captured : CaptureSet
+    tile : int
+        The number of the tile.
+    folder : Path
+        The folder of the field.
+
+    Yields
+    ------
+    float
+        The share that is done.
+
+    Returns
+    -------
+    dict
+        The tile's entry in `field.json`.
+
+    Raises
+    ------
+    CaptureSetError
+        A basis image cannot be read.
+    FieldError
+        The folder cannot be written.
     """
     choice, separate = captured.head["choice"], captured.head["separate"]
     with captured.open(tile) as data:
@@ -114,7 +173,20 @@ def fit_into(
 
 
 def about_of(captured: CaptureSet, choice: str, separate: bool, **about: Any) -> dict[str, Any]:
-    """What a field of a capture set says of itself, beside its tiles."""
+    """Collect what the description of a field says beside its tiles.
+
+    Parameters
+    ----------
+    captured : CaptureSet
+    choice : str
+    separate : bool
+    about : object
+        More values, by name.
+
+    Returns
+    -------
+    dict
+    """
     keep = ("scene", "colour_space", "samples", "file", "frame", "view_layer", "far", "key")
     keep += ("fingerprint", "route", "shot", "catchers", "take", "pair")
     known = {key: captured.head[key] for key in keep if key in captured.head}
@@ -128,11 +200,38 @@ def fit(
     separate: bool = False,
     **about: Any,
 ) -> Iterator[tuple[float, str]]:
-    """Fit a whole capture set and write the field: yields (share done, what is being done).
+    """Fit a whole capture set and write the field.
 
-    choice: one of `choice.CHOICES`; separate: a support for each channel. The field replaces
-    another in `folder` only when it is complete: closing the generator early leaves what was
-    there. Raises CaptureSetError, FieldError, PatternError.
+    The field takes the place of an older one only when it is complete. If the generator is closed
+    early, the older one stays.
+
+    Parameters
+    ----------
+    captured : CaptureSet
+    folder : Path
+        The folder of the field.
+    choice : str
+        One of `choice.CHOICES`.
+    separate : bool
+        Whether each channel gets a support of its own.
+    about : object
+        More values for the field's description, by name.
+
+    Yields
+    ------
+    share : float
+        How much is done, 0 to 1.
+    text : str
+        What is being done.
+
+    Raises
+    ------
+    CaptureSetError
+        A basis image cannot be read.
+    FieldError
+        The choice is unknown, or the folder cannot be written.
+    PatternError
+        The patterns do not identify the moments of the choice.
     """
     choices.check(choice, captured.patterns, separate)
     begun, reading = time.perf_counter(), 0.0

@@ -1,9 +1,18 @@
 """Environment matting as a baseline: one support over the entire hemicube (paper 2 and 8).
 
-Each pixel sees one cap of directions with one coefficient. Its axis is the mean direction of the
-pixel's light and its width follows from how long that mean is: a uniform cap of half angle t has a
-mean of length (1 + cos t) / 2. A cap turns with the sphere and knows no faces, which is what the
-hemicube as a single backdrop would need.
+Each pixel sees one cap of directions with one coefficient. The axis of the cap is the mean
+direction of the pixel's light. Its width follows from the length of this mean: a uniform cap of
+half angle t has a mean of length (1 + cos t) / 2. A cap turns with the sphere and crosses the
+edges of faces, as a support on a single backdrop around the scene would.
+
+Examples
+--------
+>>> from arto.core.patterns import pattern_set
+>>> basis = np.zeros((6, 3, 1, 3))
+>>> basis[0] = np.array([0.4, 0.2, 0.2])[:, None, None]  # white, u, v of the face "top"
+>>> found = fit(basis, pattern_set("linear"), Hemicube(patches=1))
+>>> found.axis.round(6).tolist(), found.cosine.round(6).tolist()
+([[0.0, 0.0, 1.0]], [1.0])
 """
 
 from __future__ import annotations
@@ -25,7 +34,16 @@ BYTES_PER_PIXEL = 3 * 2 + 3 * 2
 
 @dataclass(frozen=True)
 class Matte:
-    """coefficient: (n, 3); axis: (n, 3) unit; cosine: (n,) of the cap's half angle."""
+    """The caps of n pixels.
+
+    Parameters
+    ----------
+    coefficient : (n, 3) float
+    axis : (n, 3) float
+        Unit vectors.
+    cosine : (n,) float
+        The cosine of the half angle.
+    """
 
     coefficient: NDArray
     axis: NDArray
@@ -33,7 +51,19 @@ class Matte:
 
 
 def fit(basis: NDArray, patterns: PatternSet, hemicube: Hemicube) -> Matte:
-    """basis: (K, P, n, 3) -> one cap for each of n pixels."""
+    """Fit a cap to each pixel.
+
+    Parameters
+    ----------
+    basis : (K, P, n, 3) float
+        Basis images, scene-linear radiance.
+    patterns : PatternSet
+    hemicube : Hemicube
+
+    Returns
+    -------
+    Matte
+    """
     n = basis.shape[2]
     coefficient = np.zeros((n, 3))
     direction = np.zeros((n, 3))
@@ -52,7 +82,19 @@ def fit(basis: NDArray, patterns: PatternSet, hemicube: Hemicube) -> Matte:
 
 
 def relight(matte: Matte, light: PatchLight) -> NDArray[np.float64]:
-    """The pixels under `light` -> (n, 3)."""
+    """Compute the pixels under a light.
+
+    Parameters
+    ----------
+    matte : Matte
+    light : PatchLight
+        With the same number of bins on every patch.
+
+    Returns
+    -------
+    (n, 3) float64
+        Scene-linear radiance.
+    """
     i = np.arange(SAMPLES) + 0.5
     turn = np.pi * (1 + 5**0.5) * i
     # two directions across the axis

@@ -1,13 +1,22 @@
 """The paper's Algorithm 1: a support by descent on the squared error of the patterns (paper 5).
 
-From an initial support all expansions are tried, the best is taken while it lowers the error, and
-then the step is halved, down to `finest`. What differs from the paper's text, and why:
+From an initial support all expansions are tried. The best is taken while it lowers the error, and
+then the step is halved, down to `finest`. Three things differ from the paper's text:
 
-- Contractions are tried as well: a search that starts from the whole patch has nowhere to expand.
-- The patterns are polynomials, so their average over a box, by solid angle, is a short sum; a
-  summed-area table would be the same numbers on a grid.
-- The initial support is the previous pixel's where the coefficients are nearly equal, which forces
-  an order along a row. Rows do not depend on each other, so all rows advance together.
+- Contractions are tried as well, because a search from the whole patch cannot expand.
+- The patterns are polynomials, so their average over a box by solid angle is a short sum. A
+  summed-area table would give the same numbers on a grid.
+- The initial support is that of the previous pixel where the coefficients are nearly equal, which
+  forces an order along a row. Rows are independent, so all rows advance together.
+
+Examples
+--------
+>>> from arto.core.patterns import pattern_set
+>>> patterns, extent = pattern_set("moments"), (-1.0, 1.0, -1.0, 1.0)
+>>> box = np.array([[0.25, 0.5, 0.5, 0.75]])
+>>> basis = (patterns.matrix @ box_averages(box, extent))[..., None] * np.ones(3)
+>>> search(basis, patterns, extent, height=1).round(2).tolist()
+[[0.25, 0.5, 0.5, 0.75]]
 """
 
 from __future__ import annotations
@@ -18,7 +27,7 @@ from numpy.typing import NDArray
 from ..measure import Extent, box_averages
 from ..patterns import PatternSet
 
-# The previous pixel's support is taken up where the coefficients differ by less than this share.
+# The relative difference of coefficients up to which a pixel starts from the support before it.
 NEARLY_EQUAL = 0.1
 COARSEST = 0.25
 # Moves of (u0, u1, v0, v1): each side out and in, and the whole box sideways.
@@ -34,10 +43,10 @@ _MOVES = np.array(
 
 
 def _error(boxes: NDArray, patterns: PatternSet, extent: Extent, target: NDArray) -> NDArray:
-    """The paper's squared error over patterns and channels, over sum R^2 and less a constant.
+    """The paper's squared error over patterns and channels, over sum R^2 and without a constant.
 
-    With one support for all channels, sum_c (R_c a - I_c)^2 is sum_c R_c^2 times (a - t)^2 and what
-    no support can mend, with the target t = sum R I / sum R^2: written so, nothing cancels.
+    With one support for all channels, sum_c (R_c a - I_c)^2 equals sum_c R_c^2 times (a - t)^2 plus
+    what no support can change, with the target t = sum R I / sum R^2. In this form nothing cancels.
     boxes: (m, n, 4); target: (P, n) -> (m, n).
     """
     averages = np.tensordot(patterns.matrix, box_averages(boxes, extent), axes=1)
@@ -52,7 +61,24 @@ def descend(
     coarsest: float,
     finest: float,
 ) -> NDArray:
-    """Descend from `boxes` (n, 4) to supports of least squared error, all pixels at once."""
+    """Descend from some boxes to supports of least squared error, all pixels at once.
+
+    Parameters
+    ----------
+    boxes : (n, 4) float
+        u0, u1, v0, v1 to start from.
+    patterns : PatternSet
+    extent : tuple of 4 float
+        The place of the patch on its face.
+    target : (P, n) float
+        The basis images over the coefficient.
+    coarsest, finest : float
+        The first and the last step, in patch widths.
+
+    Returns
+    -------
+    (n, 4) float64
+    """
     boxes = boxes.copy()
     step = coarsest
     while step >= finest:
@@ -82,12 +108,32 @@ def search(
     finest: float = 1 / 256,
     follow: bool = True,
 ) -> NDArray[np.float64]:
-    """Algorithm 1 for one patch of a picture.
+    """Run Algorithm 1 for one patch of a picture.
 
-    basis: (P, n, 3) of n = height x width pixels, row by row; extent: of the patch on its face;
-    finest: the last step, in patch widths; follow: start from the previous pixel where coefficients
-    are nearly equal (the paper's rule; without it every pixel starts from the whole patch and all
-    are searched at once). -> boxes (n, 4) as u0, u1, v0, v1.
+    Parameters
+    ----------
+    basis : (P, n, 3) float
+        Basis images of n = height x width pixels, row by row.
+    patterns : PatternSet
+    extent : tuple of 4 float
+        The place of the patch on its face.
+    height : int
+        Rows of the picture.
+    finest : float
+        The last step, in patch widths.
+    follow : bool
+        Whether a pixel starts from the support of the previous pixel where their coefficients are
+        nearly equal, as in the paper. Otherwise every pixel starts from the whole patch, and all
+        are searched at once.
+
+    Returns
+    -------
+    (n, 4) float64
+        u0, u1, v0, v1.
+
+    Source
+    ------
+    Paper 5, Algorithm 1.
     """
     images = basis.astype(np.float64)
     r = patterns.coefficient(images)

@@ -99,7 +99,7 @@ FLOW = {
 
 
 def named(file: Path) -> str:
-    """The dotted name of a module: `core.exr.reading`, and `core.exr` for the room's own file."""
+    """The dotted name of a module: `core.exr.layout`, and `core.exr` for the room's own file."""
     return ".".join(file.relative_to(CORE.parent).with_suffix("").parts).removesuffix(".__init__")
 
 

@@ -1,0 +1,157 @@
+"""Opening EXR files, once all of a file is known to be there.
+
+Examples
+--------
+>>> check_complete(Path("none.exr"))
+Traceback (most recent call last):
+...
+arto.core.errors.ExrError: there is no file none.exr: it was moved or deleted; make it again
+"""
+
+from __future__ import annotations
+
+import mmap
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from ..errors import ExrError
+from .layout import LayoutError, PlainPart
+from .layout import check as check_layout
+from .layout import plain as plain_parts
+from .library import openexr
+from .window import place
+
+
+def library_parts(path: Path, header_only: bool) -> list[Any]:
+    """Open a file and give its parts as the OpenEXR library has them.
+
+    Parameters
+    ----------
+    path : Path
+    header_only : bool
+        Whether the pixels stay unread.
+
+    Returns
+    -------
+    list of OpenEXR.Part
+
+    Raises
+    ------
+    ExrError
+        The file cannot be read, or a part of it cannot be decoded.
+    """
+    parts = check_complete(path)
+    try:
+        file = openexr().File(str(path), separate_channels=True, header_only=header_only)
+    except Exception as e:  # the wheel raises plain RuntimeErrors of many wordings
+        raise ExrError(f"{path} cannot be read ({e}): it is truncated or no EXR file") from e
+    # the library warns of a part that it cannot decode, and leaves it out
+    if len(file.parts) != parts:
+        raise ExrError(f"{path} has a damaged part: make it again")
+    return list(file.parts)
+
+
+def decoded(path: Path) -> tuple[list[dict[str, Any]], list[dict[str, NDArray]]]:
+    """Read all of a file.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    heads : list of dict
+        The header of each part.
+    channels : list of dict of str to (H, W) array
+        The channels of each part, of the whole picture.
+
+    Raises
+    ------
+    ExrError
+        The file cannot be read.
+    """
+    heads, channels = [], []
+    for part in library_parts(path, header_only=False):
+        heads.append(dict(part.header))
+        channels.append({name: channel.pixels for name, channel in part.channels.items()})
+        part.channels.clear()  # otherwise the part would keep layers that `Layers.take` frees
+    try:
+        place(heads, channels)
+    except ExrError as e:
+        raise ExrError(f"{path} is damaged, {e}: make it again") from None
+    return heads, channels
+
+
+def check_complete(path: Path) -> int:
+    """Check that all of a file is there.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    int
+        The number of its parts.
+
+    Raises
+    ------
+    ExrError
+        The file is missing, truncated or damaged.
+    """
+    with _opened(path) as data, _telling(path):
+        return check_layout(data)
+
+
+def mapped(path: Path) -> tuple[mmap.mmap, list[PlainPart] | None]:
+    """Map a file's bytes into memory.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    data : mmap
+        To be closed.
+    parts : list of PlainPart or None
+        The parts of the file where they can be read in place.
+
+    Raises
+    ------
+    ExrError
+        The file is missing, truncated or damaged.
+    """
+    data = _opened(path)
+    try:
+        with _telling(path):
+            return data, plain_parts(data)
+    except ExrError:
+        data.close()
+        raise
+
+
+def _opened(path: Path) -> mmap.mmap:
+    """The bytes of a file. Raises ExrError."""
+    if not path.is_file():
+        raise ExrError(f"there is no file {path}: it was moved or deleted; make it again")
+    try:
+        if path.stat().st_size < 8:
+            raise ExrError(f"{path} is no EXR file (or an empty one): make it again")
+        with path.open("rb") as f:
+            return mmap.mmap(f.fileno(), 0, access=mmap.ACCESS_READ)
+    except OSError as e:
+        raise ExrError(f"{path} cannot be read ({e}): look at its permissions and disk") from e
+
+
+@contextmanager
+def _telling(path: Path) -> Iterator[None]:
+    """Turn a LayoutError into an ExrError that names the file."""
+    try:
+        yield
+    except LayoutError as e:
+        raise ExrError(f"{path} is truncated or damaged, {e}: make it again") from None
