@@ -34,7 +34,7 @@ _CROSS = {
 
 
 @dataclass(frozen=True)
-class Part:
+class Contribution:
     """The light that a patch gives to a pixel.
 
     Parameters
@@ -57,7 +57,7 @@ class Part:
     box: tuple[float, float, float, float] | None
 
 
-def parts_at(field: Field, light: PatchLight, x: int, y: int) -> list[Part]:
+def parts_at(field: Field, light: PatchLight, x: int, y: int) -> list[Contribution]:
     """Find the light that each patch gives to a pixel.
 
     The parts sum to the pixel, without its rest (what was too small to be an entry) and without the
@@ -72,7 +72,7 @@ def parts_at(field: Field, light: PatchLight, x: int, y: int) -> list[Part]:
 
     Returns
     -------
-    list of Part
+    list of Contribution
         The brightest first.
 
     Raises
@@ -103,7 +103,7 @@ def parts_at(field: Field, light: PatchLight, x: int, y: int) -> list[Part]:
             average = model.support.average(light, k, parameters)[0]
             place = _box_of(model.support.name, parameters[0])
             given = (reflects * np.maximum(average, 0)).astype(np.float32)
-            found.append(Part(k, model.support.name, reflects, given, place))
+            found.append(Contribution(k, model.support.name, reflects, given, place))
     return sorted(found, key=lambda part: -float(part.light.sum()))
 
 
@@ -194,7 +194,7 @@ def unfolded(hemicube: Hemicube, side: int) -> tuple[NDArray, NDArray, NDArray, 
 def drawn(
     hemicube: Hemicube,
     environment: Environment,
-    parts: list[Part],
+    parts: list[Contribution],
     side: int = 192,
     show: float = 0.7,
 ) -> NDArray[np.float32]:
@@ -207,7 +207,7 @@ def drawn(
     ----------
     hemicube : Hemicube
     environment : Environment
-    parts : list of Part
+    parts : list of Contribution
         As `parts_at` gives them.
     side : int
         Pixels along the side of a face.

@@ -98,7 +98,7 @@ def own_compositor(copy: bpy.types.Scene, made: list[Any]) -> Any:
     return copy.compositing_node_group
 
 
-class Studio:
+class Darkroom:
     """scene: the borrowed one, with its tree; made: what goes with it; folder: of files."""
 
     def __init__(self, scene: bpy.types.Scene, tree: Any, made: list[Any], folder: Path) -> None:
@@ -136,7 +136,7 @@ def composited(scene: bpy.types.Scene, text: str) -> NDArray[np.float32]:
 
 
 @contextmanager
-def studio(name: str) -> Iterator[Studio]:
+def darkroom(name: str) -> Iterator[Darkroom]:
     """A compositor to build a tree in."""
     scene = bpy.data.scenes.new(name)
     made: list[Any] = [scene]
@@ -145,6 +145,6 @@ def studio(name: str) -> Iterator[Studio]:
         if not tree.is_embedded_data:
             made.append(tree)
         with tempfile.TemporaryDirectory() as folder:
-            yield Studio(scene, tree, made, Path(folder))
+            yield Darkroom(scene, tree, made, Path(folder))
     finally:
         bpy.data.batch_remove(made)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...core import exr
 from .colour import working_space
-from .compositing import choose, mixed, studio
+from .compositing import choose, darkroom, mixed
 
 _available: list[bool] = []
 
@@ -56,7 +56,7 @@ def denoise(
     denoiser it is, by device and quality.
     """
     height, width = pictures[0].shape[:2]
-    with studio("ARTO Denoise") as on:
+    with darkroom("ARTO Denoise") as on:
         tree = on.tree
 
         def source(name: str, pixels: NDArray, space: str) -> Any:

@@ -22,7 +22,7 @@ from ..blender.nodes import shader_tree, trees
 from ..stage.small import parts_of, small
 from ..stage.stage import Stage
 from ..work import Progress, Steps
-from ..world.lamp_render import world_of
+from ..world.lamp_render import world_showing
 from . import planes
 
 SAMPLES = 48
@@ -97,7 +97,9 @@ def _white(on: Stage, hemicube: Hemicube) -> bpy.types.World:
     """
     azimuth, latitude, _ = sample_directions(HEIGHT, 2 * HEIGHT, 1)
     there = hemicube.locate(directions(azimuth, latitude))[0] >= 0
-    return world_of(on, Environment(np.repeat(there[..., None], 3, axis=-1).astype(np.float32)))
+    return world_showing(
+        on, Environment(np.repeat(there[..., None], 3, axis=-1).astype(np.float32))
+    )
 
 
 def _words(on: Stage, seen: Agreement) -> str:

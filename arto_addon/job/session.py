@@ -48,7 +48,7 @@ class Outcome:
     verb: Verb | None = None
 
 
-class Job:
+class SecondBlender:
     """A job that runs: a Blender of its own on a snapshot in a folder of its own."""
 
     def __init__(self, verb: Verb, scene: bpy.types.Scene, view_layer: str) -> None:
@@ -176,10 +176,10 @@ def _remove_leftovers(claimed: Path) -> None:
             marked.remove_quietly(folder, "job", claimed)
 
 
-current: Job | None = None
+current: SecondBlender | None = None
 outcome: Outcome | None = None
 # What is done in the window with what a job has made, by verb.
-finishers: dict[Verb, Callable[[Job], str]] = {}
+finishers: dict[Verb, Callable[[SecondBlender], str]] = {}
 
 
 def busy() -> str:
@@ -187,13 +187,13 @@ def busy() -> str:
     return f"ARTO is {VERBS[current.verb].doing} {current.title}" if current else ""
 
 
-def start(verb: Verb, scene: bpy.types.Scene, view_layer: str) -> Job:
+def start(verb: Verb, scene: bpy.types.Scene, view_layer: str) -> SecondBlender:
     """Start a job. Raises BusyError where one runs, SceneError; the window goes on."""
     global current, outcome
     if current:
         raise BusyError(f"{busy()}: wait until it is done, or cancel it")
     outcome = None
-    current = Job(verb, scene, view_layer)
+    current = SecondBlender(verb, scene, view_layer)
     bpy.app.timers.register(_follow, first_interval=EVERY, persistent=True)
     watch.redraw()
     return current
@@ -267,7 +267,7 @@ def plain(text: str) -> str:
     return "rendering" if parts == "1" else f"rendering, part {part} of {parts}"
 
 
-def _show_share(job: Job | None) -> None:
+def _show_share(job: SecondBlender | None) -> None:
     text = None
     if job:
         text = f"{busy()}: {plain(job.state.text)}, {job.line}   (ESC: cancel)"

@@ -43,7 +43,7 @@ _REAP = 2.0
 
 
 @dataclass(frozen=True)
-class Asked:
+class Question:
     """What the window asks for. blend: a file with the world in it; width: of a full map, 0 for a
     rough one; painted: images in no file, by name, and where their pixels are; folder: where full
     maps are kept; out: the .npy to write."""
@@ -144,7 +144,7 @@ class Maps:
         for image in images(world):
             if in_no_file(image):
                 painted[image.name] = str(self._folder / painted_pixels(image, self._folder))
-        question = Asked(
+        question = Question(
             blend=str(blend),
             world=name,
             width=scene.arto.environment_width if full else 0,
@@ -226,7 +226,7 @@ def serve() -> int:
     """That Blender's side: answer questions until there are no more; the exit code."""
     for line in sys.stdin:
         try:
-            said = {"map": _made(Asked(**json.loads(line)))}
+            said = {"map": _made(Question(**json.loads(line)))}
         except ArtoError as e:
             said = {"error": str(e)}
         except Exception as e:
@@ -235,7 +235,7 @@ def serve() -> int:
     return 0
 
 
-def _made(asked: Asked) -> str:
+def _made(asked: Question) -> str:
     scene = bpy.context.scene
     work_in(asked.space)
     scene.frame_set(asked.frame, subframe=asked.subframe)

@@ -37,7 +37,7 @@ class Wish:
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class Drawn:
     """A picture (h, w, 4), at 1 / factor of the size, rows top-down; what it is of, and how many
     seconds after it was wished for it was there."""
 
@@ -54,7 +54,7 @@ class Viewer:
         self.preview = preview
         self._condition = threading.Condition()
         self._wish: Wish | None = None
-        self._shown: Shown | None = None
+        self._shown: Drawn | None = None
         self._closed = False
         self.trouble = ""
         # how many pictures were made
@@ -68,7 +68,7 @@ class Viewer:
             self._wish = wish
             self._condition.notify()
 
-    def take(self) -> Shown | None:
+    def take(self) -> Drawn | None:
         """The newest picture that was not taken yet."""
         with self._condition:
             shown, self._shown = self._shown, None
@@ -113,7 +113,7 @@ class Viewer:
                 self._shown = shown
 
 
-def show(preview: Preview, wish: Wish) -> Shown:
+def show(preview: Preview, wish: Wish) -> Drawn:
     """The picture that is wished for. Raises FieldError."""
     image, factor = wish.image, 1
     if not wish.resting:
@@ -129,7 +129,7 @@ def show(preview: Preview, wish: Wish) -> Shown:
         there = view.any(axis=-1, keepdims=True)
         picture[:h, :w, :3] += (1 - picture[:h, :w, 3:]) * environment.at(view) * there
         picture[:h, :w, 3:] = np.where(there, 1, picture[:h, :w, 3:])
-    return Shown(wish, picture, factor, time.perf_counter() - wish.at)
+    return Drawn(wish, picture, factor, time.perf_counter() - wish.at)
 
 
 # The last map that was made coarser: a hand turns the same one.

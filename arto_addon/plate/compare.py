@@ -26,7 +26,7 @@ def begin(scene: bpy.types.Scene) -> bpy.types.Image:
     if not path.is_file():
         raise SceneError("there is no plate to compare: press Relight first")
     plate = next(iter(exr.read(path).values()))
-    render = _last_render(scene)
+    render = _last_render()
     if render.shape[:2] != plate.shape[:2]:
         raise SceneError(
             f"the last render is {render.shape[1]} x {render.shape[0]}, the plate "
@@ -38,7 +38,7 @@ def begin(scene: bpy.types.Scene) -> bpy.types.Image:
     return update(scene) or bpy.data.images[IMAGE]
 
 
-def _last_render(scene: bpy.types.Scene) -> NDArray[np.float32]:
+def _last_render() -> NDArray[np.float32]:
     """What Blender rendered last, (H, W, 4). Raises SceneError where it has rendered nothing."""
     result = bpy.data.images.get("Render Result")
     settings = bpy.data.scenes.new("ARTO Output")

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ...core import exr
 from ...core.errors import SceneError
 from ...core.exr.window import Box
-from ..blender.compositing import choose, compositor, studio, turned_off
+from ..blender.compositing import choose, compositor, darkroom, turned_off
 from ..blender.pictures import put
 from ..stage.stage import picture_size
 
@@ -84,7 +84,7 @@ class Footage:
         self, scene: bpy.types.Scene, size: tuple[int, int], opaque: bool
     ) -> NDArray[np.float32]:
         """What Blender's compositor shows of it in a frame of a size, (H, W, 4)."""
-        with studio("ARTO Footage") as on:
+        with darkroom("ARTO Footage") as on:
             scale = on.tree.nodes.new("CompositorNodeScale")
             choose(scale, "Type", "Render Size")
             choose(scale, "Frame Type", _FILLS[self.fills])

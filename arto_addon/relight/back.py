@@ -94,7 +94,7 @@ def mix_to_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> Path:
     path = world_file(path)
     exr.write(path, {"": image}, None, working_space())
     _gain_lamps(scene, mix)
-    scene.world = _world_of(path, whole.turn)
+    scene.world = _world_showing(path, whole.turn)
     scene.view_layers[layer].world_override = None
     return path
 
@@ -137,7 +137,7 @@ def _gain_lamps(scene: bpy.types.Scene, mix: Mix) -> None:
                 lamp.color = np.array(lamp.color[:]) * (gain / most)
 
 
-def _world_of(path: Path, turn: float) -> bpy.types.World:
+def _world_showing(path: Path, turn: float) -> bpy.types.World:
     """A world that shows a map, turned."""
     world = bpy.data.worlds.get(WORLD) or new_world(WORLD)
     tree = world.node_tree

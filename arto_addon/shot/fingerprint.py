@@ -80,7 +80,7 @@ def fingerprint(
     roots: list[bpy.types.ID] = [*_rendered(layer), *filter(None, [scene.camera])]
     roots += filter(None, [layer.material_override])
     out = {"Render settings": _settings(scene, layer), **of_blocks(roots, then, full)}
-    out |= _worked_out(scene, layer)
+    out |= _worked_out(layer)
     return dict(sorted(out.items()))
 
 
@@ -209,7 +209,7 @@ def _flags(there: bpy.types.LayerCollection) -> list[Any]:
     return found + [f for child in there.children for f in _flags(child)]
 
 
-def _worked_out(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> Fingerprint:
+def _worked_out(layer: bpy.types.ViewLayer) -> Fingerprint:
     """Transforms and deformed geometry, as far as the viewport has them."""
     depsgraph = layer.depsgraph
     if depsgraph is None or not depsgraph.scene:

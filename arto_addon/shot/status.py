@@ -96,15 +96,6 @@ def _nearest(scene: bpy.types.Scene, view_layer: str | None, place: Place) -> Sh
     return found
 
 
-def unfinished_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line | None:
-    """What was stopped beside a capture set that is there; None for nothing."""
-    place = _place(scene, view_layer)
-    if place is None or place.owner or _capture_set(place) is None:
-        return None
-    stopped = unfinished(place.source)
-    return (f"and unfinished: {'; '.join(stopped)}", False) if stopped else None
-
-
 def caution_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line | None:
     """What the check of the light found before the capture; None for nothing."""
     place = _place(scene, view_layer)

@@ -21,7 +21,7 @@ from . import thumbnails
 from .places import Draws, say
 
 
-class Light(Draws):
+class LightPanel(Draws):
     """The world's light, and the scene's own lamps"""
 
     label = "Light"

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from . import more_panels as more
-from .light_panel import ARTO_UL_looks, Light
+from .light_panel import ARTO_UL_looks, LightPanel
 from .places import panels
 from .result_panel import Result
-from .shot_panel import Quality, Shot
+from .shot_panel import Quality, ShotPanel
 
 CLASSES = (
     ARTO_UL_looks,
     *panels("main", more.Main, sidebar=False),
-    *panels("shot", Shot),
-    *panels("light", Light),
+    *panels("shot", ShotPanel),
+    *panels("light", LightPanel),
     *panels("result", Result),
     *panels("quality", Quality, sidebar=False),
     *panels("frames", more.Frames, sidebar=False),

@@ -6,7 +6,7 @@ import bpy
 
 from ...core.units import clock
 from ..job import session
-from ..job.session import Job
+from ..job.session import SecondBlender
 from ..job.verbs import Verb
 from ..shot import status
 from ..stage.settings import looks_otherwise, samples_of
@@ -27,7 +27,7 @@ _ICONS = {
 }
 
 
-class Shot(Draws):
+class ShotPanel(Draws):
     """Which picture this is, whether it is captured, and the button that captures it"""
 
     label = "Shot"
@@ -85,7 +85,7 @@ def _buttons(column: bpy.types.UILayout, context: bpy.types.Context, found: stat
         say(column, context, text, "INFO")
 
 
-def running(column: bpy.types.UILayout, context: bpy.types.Context, job: Job) -> None:
+def running(column: bpy.types.UILayout, context: bpy.types.Context, job: SecondBlender) -> None:
     """One bar over everything, what is done, and a cross: as high as the button that it stands for,
     so that nothing below it jumps while a hand is on it."""
     column.separator(factor=0.5)

@@ -34,12 +34,11 @@ ALL_TAKES = 1.6
 class Told:
     """kind: `blocked`, `none`, `unfinished`, `unfitted`, `ready`, `changed`, `elsewhere` (captured
     of another camera, frame or size), `other` (captured for another file or scene); lines: at most
-    two; button: what the large one says; ok: whether a relight serves."""
+    two; button: what the large one says."""
 
     kind: str
     lines: tuple[str, ...]
     button: str
-    ok: bool = False
 
 
 def told(scene: bpy.types.Scene) -> Told:
@@ -79,12 +78,12 @@ def told(scene: bpy.types.Scene) -> Told:
             text = _elsewhere(then, shot_of(scene, layer))
             return Told("elsewhere", (text, *more), "Continue" if more else "Capture Again")
         text = text[0].upper() + text[1:]
-        return Told("changed", (text, *more), "Continue" if more else "Capture Again", True)
+        return Told("changed", (text, *more), "Continue" if more else "Capture Again")
     about = status.field_of(place.source)
     when = _when(place.source / "field" / field.HEADER)
     samples = about.about.get("samples", "?") if about else "?"
     text = tr("Ready, captured {when}, {samples} samples", when=when, samples=samples)
-    return Told("ready", (text, *more), "Continue" if more else "Capture Again", True)
+    return Told("ready", (text, *more), "Continue" if more else "Capture Again")
 
 
 def _elsewhere(then: Shot, now: Shot) -> str:

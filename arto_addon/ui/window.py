@@ -9,7 +9,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..job import session, snapshot
-from ..job.session import Job
+from ..job.session import SecondBlender
 from ..job.verbs import Verb
 from ..live import live
 from ..plate import compare
@@ -27,13 +27,13 @@ from .reveal import reveal
 _keys: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
 
 
-def _scene_of(job: Job) -> bpy.types.Scene | None:
+def _scene_of(job: SecondBlender) -> bpy.types.Scene | None:
     """The scene of a job, if its file is still open."""
     scene = next((s for s in bpy.data.scenes if s.arto.scene_id == job.scene_id), None)
     return scene if bpy.data.filepath == job.blend else None
 
 
-def show_relit(job: Job) -> str:
+def show_relit(job: SecondBlender) -> str:
     """A relight has ended: put the plate, or its frames, into the file, if that is still open, and
     show it."""
     path = Path(job.state.result)
@@ -52,7 +52,7 @@ def show_relit(job: Job) -> str:
     return job.state.text
 
 
-def show_captured(job: Job) -> str:
+def show_captured(job: SecondBlender) -> str:
     """A capture has ended: its light groups come into the panel, and the shot in its light into the
     window."""
     scene = _scene_of(job)
@@ -65,7 +65,7 @@ def show_captured(job: Job) -> str:
     return job.state.text
 
 
-def show_looks(job: Job) -> str:
+def show_looks(job: SecondBlender) -> str:
     """All looks were relit: each has its image and its node."""
     scene = _scene_of(job)
     if scene is None:
@@ -84,7 +84,7 @@ def show_looks(job: Job) -> str:
     return job.state.text
 
 
-def show_verified(job: Job) -> str:
+def show_verified(job: SecondBlender) -> str:
     """Show where the plate is off."""
     scene = _scene_of(job)
     path = Path(job.state.result)
@@ -107,7 +107,7 @@ def _before_save(*_: object) -> None:
             live.current._wished = ()
 
 
-_FINISHERS: dict[Verb, Callable[[Job], str]] = {
+_FINISHERS: dict[Verb, Callable[[SecondBlender], str]] = {
     "relight": show_relit,
     "relight_frames": show_relit,
     "relight_looks": show_looks,

@@ -28,7 +28,7 @@ from ..stage.takes import WHOLE, take
 from ..work import Steps
 
 
-def world_of(on: Stage, shown: Environment, group: str = "") -> Any:
+def world_showing(on: Stage, shown: Environment, group: str = "") -> Any:
     """A world that shows a map, in a light group of its own where one is named."""
     height, width = shown.image.shape[:2]
     image = on.made(
@@ -114,7 +114,7 @@ def _lit_by(
         for name in ("sample_clamp_direct", "sample_clamp_indirect"):
             on.change(f"cycles.{name}", getattr(scene.cycles, name))
         group = free_mark() + "lamps"
-        on.scene.world = world_of(on, shown, group)
+        on.scene.world = world_showing(on, shown, group)
         on.scene.view_layers[0].lightgroups.add(name=group)
         set_region(on.scene, field.region)
         yield on, group

@@ -12,7 +12,7 @@ import pytest
 from arto.arto_addon import work
 from arto.arto_addon.capture import capture, planned
 from arto.arto_addon.fit import fit
-from arto.arto_addon.shot import status
+from arto.arto_addon.shot import paths, status
 from arto.arto_addon.stage.stage import picture_region
 from arto.core import exr
 from arto.core.capture.names import GROUP
@@ -186,7 +186,7 @@ def test_another_capture_does_not_go_on_with_it(tmp_path, monkeypatch):
     there = captured(scene)
     assert (there.folder / "tile_0000.exr").stat().st_mtime_ns != old
     # nor is it thrown away: with its settings again, it goes on
-    assert status.unfinished_line(scene) == ("and unfinished: 1 of 2 tiles", False)
+    assert status.unfinished(paths.place(scene, "ViewLayer").source) == ["1 of 2 tiles"]
     scene.arto.samples -= 1
     there = captured(scene)
     assert (there.folder / "tile_0000.exr").stat().st_mtime_ns == old

@@ -138,8 +138,8 @@ def test_a_setting_stands_in_the_panels_that_it_says(scene, monkeypatch):
         region=None,
     )
     panels = {
-        "Shot": shot_panel.Shot,
-        "Light": light_panel.Light,
+        "Shot": shot_panel.ShotPanel,
+        "Light": light_panel.LightPanel,
         "Result": result_panel.Result,
         "Quality": shot_panel.Quality,
         "Layers": more_panels.Layers,
