@@ -42,7 +42,9 @@ def relight_many(
     """
     if turns > 1 and frames:
         raise SceneError("a turntable is of one frame: leave one of the two out")
+    _check_worlds(worlds)
     scene.view_layers[view_layer].update()
+    _check_frames(scene, view_layer, frames)
     done: list[Path] = []
     total = max(len(worlds), 1) * max(turns, len(frames), 1)
     still = None if frames else _shown(scene, view_layer, None)
@@ -81,6 +83,38 @@ def relight_many(
                         done.append(one.lit.path)
     yield Progress(1.0, f"wrote {len(done)} pictures, the last one {done[-1]}")
     return done
+
+
+def _check_worlds(worlds: Sequence[Path]) -> None:
+    """Raise SceneError where a file of a world is missing, or two pictures had one name."""
+    names: dict[str, Path] = {}
+    for file in worlds:
+        if not file.is_file():
+            raise SceneError(f"there is no environment map {file}")
+        # no difference to Windows and macOS
+        name = safe_name(file.stem).casefold()
+        if name in names:
+            raise SceneError(
+                f"{names[name]} and {file} would be written to one picture: give one of them "
+                "another name, or relight them one after the other"
+            )
+        names[name] = file
+
+
+def _check_frames(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> None:
+    """Raise CaptureSetError where some frames of a shot were captured and others of the sequence
+    were not: an animated world over a still is of one captured frame."""
+    begun = paths.frames(scene, view_layer)
+    there = sorted(frame for frame, whole in begun.items() if whole)
+    missing = [frame for frame in frames if frame not in there]
+    if not missing or not there or (len(begun) == 1 and len(there) == 1):
+        return
+    known = ", ".join(f"{n:g}" for n in there[:10])
+    some = ", ".join(str(frame) for frame in missing[:10]) + (", ..." if missing[10:] else "")
+    raise CaptureSetError(
+        f"of this shot the frames {known} are captured, and {some} not, "
+        "or not to the end: capture these too (--frames), or discard what is unfinished"
+    )
 
 
 def _quietly(steps: Steps, share: float) -> Steps:

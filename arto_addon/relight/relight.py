@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.catcher import catch_seen, of_ground
+from ...core.errors import FieldError
 from ...core.light.environment import Environment
 from ...core.light.lamps import Split
 from ...core.light.light import PatchLight
@@ -153,6 +154,8 @@ def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> S
         yield Progress(0.8, "adding the world behind")
         _behind(shown, lit, picture, ready.found.share > LEAST_SHARE)
         lap("background")
+        check_finite(picture, f"the world '{ready.world.name}' behind the scene")
+    check_finite(picture, "the sum of the picture's parts")
     about = {"scene": scene.name, "world": ready.world.name, "denoised": denoised}
     about[light_key.HEADER.removeprefix("arto.")] = light_key.light_key(scene, ready.world)
     yield from files.write(shown, ready, files.Made(picture, things, caught), about)
@@ -162,14 +165,35 @@ def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> S
     return ready.laps.seconds
 
 
+def check_finite(picture: NDArray | float, name: str) -> None:
+    """Raise FieldError where a picture, (H, W, C), has a value that is infinite or not a number.
+
+    name: what the picture is, for the message: it has to say where such a value comes from.
+    """
+    good = np.isfinite(picture)
+    if good.all():
+        return
+    bad = np.argwhere(~good.all(axis=-1)) if good.ndim == 3 else np.argwhere(~good)
+    at = f", the first at row {bad[0][0]}, column {bad[0][1]}" if bad.shape[1] > 1 else ""
+    raise FieldError(
+        f"{name} is infinite or not a number in {len(bad)} pixels{at}, so no picture was written: "
+        "if it is a field, fit or capture again; else look at what is so bright there"
+    )
+
+
 def _with_own(
     shown: Shown, ready: Ready, picture: NDArray[np.float32], parts: list[NDArray[np.float32]]
 ) -> Steps:
     """The pictures that a take's plate is the sum of: of what its field shows, (H, W, 4), with the
     scene's own lamps, and of the lamps of the world."""
+    check_finite(picture, f"what the reflectance field in {shown.field.folder} shows")
+    for part in parts:
+        check_finite(part, "the render of the world's lamps")
     if shown.held:
         yield from _hold(shown, ready.whole, picture, parts)
-    picture[..., :3] += own_of(shown.scene, shown.field)
+    own = own_of(shown.scene, shown.field)
+    check_finite(own, f"the scene's own lamps in the field {shown.field.folder}")
+    picture[..., :3] += own
     parts = [*parts, picture[..., :3]]
     return [sum(parts)] if ready.together else parts
 

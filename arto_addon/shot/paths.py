@@ -178,6 +178,24 @@ def nearest(scene: bpy.types.Scene, view_layer: str | None = None) -> Shot | Non
     return min(found, key=lambda f: f[:3])[3] if found else None
 
 
+def frames(scene: bpy.types.Scene, view_layer: str) -> dict[float, bool]:
+    """The frames of the scene's shots that a capture was begun of, and whether there is a field of
+    each. Raises SceneError, OSError."""
+    root, shot = _root(scene), shot_of(scene, view_layer)
+    found: dict[float, bool] = {}
+    for header in root.glob(f"*/*/*/{HEADER}"):
+        there = _shot_in(header.parent)
+        if not there or not shot.scene_id:
+            continue
+        then = there[0]
+        if (then.scene_id, then.view_layer) != (shot.scene_id, shot.view_layer):
+            continue
+        frame = then.frame + (then.subframe or 0.0)
+        whole = (header.parent / "field" / FIELD_HEADER).is_file()
+        found[frame] = found.get(frame, False) or whole
+    return found
+
+
 def shown(scene: bpy.types.Scene) -> str:
     """The shot's folder for a panel, empty where there is none."""
     try:

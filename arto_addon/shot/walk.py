@@ -275,7 +275,7 @@ def shape_keys(keys: bpy.types.Key) -> str:
 
 
 # Of files: (path, size, time) -> digest of what is in them.
-_contents: dict[tuple[str, int, int], str] = {}
+_contents: dict[tuple[str, int, int, int, int], str] = {}
 
 
 def image(block: bpy.types.Image, then: str = "", full: bool = False) -> str:
@@ -311,7 +311,8 @@ def file(path: str, library: bpy.types.Library | None, then: str = "", full: boo
         if not (full or touched):
             same = was if was[:2] == [str(size), str(at)] else ["", "", ""]
             return f"{size}:{at}:{same[2]}"
-        key = str(there), size, at
+        # a copy may have the time and the size of what it replaces, but not these two as well
+        key = str(there), size, at, stat.st_ctime_ns, stat.st_ino
         if key not in _contents:
             with there.open("rb") as f:
                 _contents[key] = hashlib.file_digest(

@@ -111,7 +111,8 @@ def _key(scene: bpy.types.Scene, world: bpy.types.World, width: int) -> str:
     """What a map hangs on, in sixteen letters."""
     of: list[Any] = [VERSION, width, bpy.app.version_string, working_space()]
     # a copy of the world has another name
-    found = of_blocks([world])
+    # by what is in the files: an HDRI may be replaced by one of the same size and time
+    found = of_blocks([world], full=True)
     of.append(sorted(("World" if k.startswith("World") else k, v) for k, v in found.items()))
     if moving_images(world):
         of.append((scene.frame_current, scene.frame_subframe))

@@ -10,15 +10,19 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import bpy
+import numpy as np
 import pytest
 from arto.arto_addon.blender import scripts
 from arto.arto_addon.capture.resume import empty, empty_take
 from arto.arto_addon.farm import job as farm_job
 from arto.arto_addon.farm.plan import _make_way
 from arto.arto_addon.job import session
+from arto.arto_addon.relight import many
+from arto.arto_addon.relight.relight import check_finite
+from arto.arto_addon.world import kept as maps
 from arto.core import marked
 from arto.core.capture.capture_set import describe, write_header
-from arto.core.errors import FarmError, FilesError, SceneError
+from arto.core.errors import CaptureSetError, FarmError, FieldError, FilesError, SceneError
 from arto.core.hemicube import Hemicube
 from arto.core.patterns import pattern_set
 
@@ -211,3 +215,69 @@ def test_a_driver_that_was_refused_is_said(tmp_path):
             with pytest.raises(SceneError, match="Auto Run Python Scripts"):
                 scripts.check_drivers()
     bpy.ops.wm.read_factory_settings()
+
+
+@pytest.mark.parametrize(
+    ("begun", "frames", "good"),
+    [
+        ({1: True}, [1, 2, 3], True),  # an animated world over a still
+        ({5: True}, [1, 2, 3], True),
+        ({}, [1, 2], True),  # which says to capture
+        ({1: True, 2: True, 3: True}, [1, 2, 3], True),
+        ({1: True, 2: True, 3: False}, [1, 2, 3, 4], False),  # killed in frame 3
+        ({1: True, 2: False}, [1, 2, 3], False),  # killed in frame 2
+        ({1: True, 2: True}, [1, 2, 3], False),  # killed between two
+        ({1: True, 2: True}, [2], True),
+    ],
+)
+def test_a_sequence_with_a_gap_is_refused(monkeypatch, begun, frames, good):
+    monkeypatch.setattr(many.paths, "frames", lambda *_: begun)
+    if good:
+        many._check_frames(bpy.context.scene, "ViewLayer", frames)
+    else:
+        with pytest.raises(CaptureSetError, match="not to the end"):
+            many._check_frames(bpy.context.scene, "ViewLayer", frames)
+
+
+def test_two_worlds_of_one_name_are_refused_before_work(tmp_path):
+    for name in ("a/ok.exr", "b/OK.exr", "b/other.exr"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    a, b, other = (tmp_path / n for n in ("a/ok.exr", "b/OK.exr", "b/other.exr"))
+    many._check_worlds([a, other])
+    for pair in ([a, b], [a, a]):
+        with pytest.raises(SceneError, match="one picture"):
+            many._check_worlds(pair)
+    with pytest.raises(SceneError, match="no environment map"):
+        many._check_worlds([a, tmp_path / "none.exr"])
+
+
+def test_an_hdri_of_the_same_size_and_time_is_another(tmp_path):
+    """As `rsync -t` and `cp -p` put it there."""
+    path = tmp_path / "sky.exr"
+    path.write_bytes(b"one sky")
+    os.utime(path, ns=(1, 1))
+    world = bpy.data.worlds.new("Sky")
+    world.use_nodes = True
+    image = bpy.data.images.new("sky", 4, 2, float_buffer=True)
+    image.source, image.filepath = "FILE", str(path)
+    world.node_tree.nodes.new("ShaderNodeTexEnvironment").image = image
+    before = maps._key(bpy.context.scene, world, 64)
+    assert maps._key(bpy.context.scene, world, 64) == before
+    (tmp_path / "new").write_bytes(b"two sky")
+    os.utime(tmp_path / "new", ns=(1, 1))
+    (tmp_path / "new").replace(path)
+    assert maps._key(bpy.context.scene, world, 64) != before
+    bpy.data.worlds.remove(world)
+    bpy.data.images.remove(image)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("channel", [0, 3])
+def test_a_picture_that_is_no_number_names_where_it_comes_from(value, channel):
+    picture = np.ones((4, 5, 4), np.float32)
+    check_finite(picture, "the field")
+    check_finite(0.0, "own lamps")
+    picture[2, 3, channel] = value
+    with pytest.raises(FieldError, match=r"the field is infinite.* 1 pixels.*row 2, column 3"):
+        check_finite(picture, "the field")
