@@ -10,7 +10,6 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -33,7 +32,7 @@ _SETTINGS = {
 }
 
 
-def choose(node: Any, menu: str, choice: str) -> None:
+def choose(node: bpy.types.Node, menu: str, choice: str) -> None:
     """Choose of a node's menu, both by the names that the artist reads."""
     if FIVE:
         node.inputs[menu].default_value = choice
@@ -41,7 +40,7 @@ def choose(node: Any, menu: str, choice: str) -> None:
         setattr(node, _SETTINGS[node.bl_idname, menu], choice.upper().replace(" ", "_"))
 
 
-def compositor(scene: bpy.types.Scene) -> Any:
+def compositor(scene: bpy.types.Scene) -> bpy.types.NodeTree | None:
     """The tree of a scene's compositor, None where it has none."""
     return scene.compositing_node_group if FIVE else scene.node_tree
 
@@ -51,7 +50,7 @@ def turned_off(scene: bpy.types.Scene) -> bool:
     return not FIVE and scene.node_tree is not None and not scene.use_nodes
 
 
-def new_compositor(scene: bpy.types.Scene, name: str) -> Any:
+def new_compositor(scene: bpy.types.Scene, name: str) -> bpy.types.NodeTree:
     """An empty tree as the scene's compositor; its name is seen from Blender 5 on."""
     if FIVE:
         tree = bpy.data.node_groups.new(name, "CompositorNodeTree")
@@ -63,12 +62,14 @@ def new_compositor(scene: bpy.types.Scene, name: str) -> Any:
     return scene.node_tree
 
 
-def add_output(tree: Any) -> Any:
+def add_output(tree: bpy.types.NodeTree) -> bpy.types.Node:
     """The node of a scene's compositor that puts out what is linked to its input 'Image'."""
     return tree.nodes.new(OUTPUT)
 
 
-def mixed(tree: Any, how: str, one: Any, other: Any) -> Any:
+def mixed(
+    tree: bpy.types.NodeTree, how: str, one: bpy.types.NodeSocket, other: bpy.types.NodeSocket
+) -> bpy.types.NodeSocket:
     """The sum or product of two colours in a compositor tree, a socket."""
     node = tree.nodes.new("ShaderNodeMix")
     node.data_type, node.blend_type, node.clamp_factor = "RGBA", how, False
@@ -82,14 +83,14 @@ def mixed(tree: Any, how: str, one: Any, other: Any) -> Any:
     return next(s for s in node.outputs if s.enabled)
 
 
-def places_of_groups() -> Iterator[Any]:
+def places_of_groups() -> Iterator[bpy.types.NodeTree]:
     """Every tree that may have a compositor's node group in it."""
     yield from bpy.data.node_groups
     if not FIVE:
         yield from (s.node_tree for s in bpy.data.scenes if s.node_tree)
 
 
-def own_compositor(copy: bpy.types.Scene, made: list[Any]) -> Any:
+def own_compositor(copy: bpy.types.Scene, made: list[bpy.types.ID]) -> bpy.types.NodeTree:
     """The tree of a copied scene's compositor, made its own; noted in `made` where it must go."""
     if not FIVE:
         return copy.node_tree  # which was copied with it
@@ -101,10 +102,18 @@ def own_compositor(copy: bpy.types.Scene, made: list[Any]) -> Any:
 class Darkroom:
     """scene: the borrowed one, with its tree; made: what goes with it; folder: of files."""
 
-    def __init__(self, scene: bpy.types.Scene, tree: Any, made: list[Any], folder: Path) -> None:
+    def __init__(
+        self,
+        scene: bpy.types.Scene,
+        tree: bpy.types.NodeTree,
+        made: list[bpy.types.ID],
+        folder: Path,
+    ) -> None:
         self.scene, self.tree, self.made, self.folder = scene, tree, made, folder
 
-    def composite(self, socket: Any, size: tuple[int, int], text: str) -> NDArray[np.float32]:
+    def composite(
+        self, socket: bpy.types.NodeSocket | None, size: tuple[int, int], text: str
+    ) -> NDArray[np.float32]:
         """What comes out of a socket of the tree, (H, W, 4), scene-linear, in full precision.
 
         size: width and height; text: what this is, where it is told. Raises CancelledError.
@@ -139,7 +148,7 @@ def composited(scene: bpy.types.Scene, text: str) -> NDArray[np.float32]:
 def darkroom(name: str) -> Iterator[Darkroom]:
     """A compositor to build a tree in."""
     scene = bpy.data.scenes.new(name)
-    made: list[Any] = [scene]
+    made: list[bpy.types.ID] = [scene]
     try:
         tree = new_compositor(scene, name)
         if not tree.is_embedded_data:

@@ -6,8 +6,6 @@ word. So a picture of known noise is denoised once, and what cannot denoise says
 
 from __future__ import annotations
 
-from typing import Any
-
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +57,7 @@ def denoise(
     with darkroom("ARTO Denoise") as on:
         tree = on.tree
 
-        def source(name: str, pixels: NDArray, space: str) -> Any:
+        def source(name: str, pixels: NDArray, space: str) -> bpy.types.NodeSocket:
             path = on.folder / f"{name}.exr"
             exr.write(path, {"": pixels})
             image = bpy.data.images.load(str(path))

@@ -13,7 +13,7 @@ from .version import FIVE
 class Nodes:
     """A few calls that make building a node tree read like the formula it is."""
 
-    def __init__(self, tree: Any) -> None:
+    def __init__(self, tree: bpy.types.NodeTree) -> None:
         self.tree = tree
 
     def add(self, kind: str, *inputs: Any, operation: str = "") -> Any:
@@ -32,12 +32,12 @@ class Nodes:
         return self.add("ShaderNodeMath", *inputs, operation=operation).outputs[0]
 
 
-def new_material(name: str) -> Any:
+def new_material(name: str) -> bpy.types.Material:
     """A material with the nodes that Blender gives it."""
     return _noded(bpy.data.materials.new(name))
 
 
-def new_world(name: str) -> Any:
+def new_world(name: str) -> bpy.types.World:
     """A world with the nodes that Blender gives it."""
     return _noded(bpy.data.worlds.new(name))
 
@@ -48,12 +48,12 @@ def _noded(block: Any) -> Any:
     return block
 
 
-def shader_tree(block: Any) -> Any:
+def shader_tree(block: bpy.types.ID) -> bpy.types.NodeTree | None:
     """The tree that a material, world or lamp is rendered by; None where it has none in use."""
     return block.node_tree if FIVE or block.use_nodes else None
 
 
-def made_of_nodes(material: Any) -> Any:
+def made_of_nodes(material: bpy.types.Material) -> bpy.types.NodeTree:
     """The tree that a material of our own is rendered by. One that does without nodes, as it can
     before Blender 5, gets those that look the same."""
     if shader_tree(material) is None:
@@ -65,7 +65,7 @@ def made_of_nodes(material: Any) -> Any:
     return material.node_tree
 
 
-def world_of_nodes(world: Any) -> Any:
+def world_of_nodes(world: bpy.types.World) -> bpy.types.NodeTree:
     """The tree of a world, which is given one where it does without, as it can before Blender 5:
     one that shows its colour, as the world did."""
     if shader_tree(world) is None:
@@ -78,7 +78,7 @@ def world_of_nodes(world: Any) -> Any:
     return world.node_tree
 
 
-def trees(tree: Any, seen: set[int]) -> Iterator[Any]:
+def trees(tree: bpy.types.NodeTree | None, seen: set[int]) -> Iterator[bpy.types.NodeTree]:
     """A node tree and the groups in it, each once."""
     if tree is None or tree.as_pointer() in seen:
         return

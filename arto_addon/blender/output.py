@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import bpy
 
@@ -25,7 +24,7 @@ if FIVE:
     _WRITING["save_output"] = True  # before, what is rendered to be written is written
 
 
-def _as_new(settings: Any) -> None:
+def _as_new(settings: bpy.types.ImageFormatSettings) -> None:
     """Every setting as a new scene has it; a file brings those of the version that made it."""
     new = bpy.data.scenes.new("ARTO Output")
     try:
@@ -39,7 +38,7 @@ def _as_new(settings: Any) -> None:
         bpy.data.scenes.remove(new)
 
 
-def set_format(settings: Any, media: str, kind: str) -> None:
+def set_format(settings: bpy.types.ImageFormatSettings, media: str, kind: str) -> None:
     """Choose a file format; from Blender 5 on it is among those of a medium."""
     if FIVE:
         settings.media_type = media

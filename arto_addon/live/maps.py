@@ -15,7 +15,6 @@ import threading
 from collections import OrderedDict
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -267,7 +266,7 @@ def _made(asked: Question) -> str:
 
 
 # By what they are of: HDRIs brought to a size that Cycles has in a moment.
-_small: dict[tuple[Any, ...], str] = {}
+_small: dict[tuple[object, ...], str] = {}
 
 
 def _reduced(image: bpy.types.Image) -> bpy.types.Image | None:

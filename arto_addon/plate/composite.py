@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -56,7 +55,7 @@ def _composited(scene: bpy.types.Scene) -> NDArray[np.float32]:
     """What the compositor puts out, (H, W, 4), in a copy of the scene in which nothing asks for a
     render or writes a file."""
     copy = scene.copy()
-    made: list[Any] = [copy]
+    made: list[bpy.types.ID] = [copy]
     try:
         copy.frame_set(scene.frame_current, subframe=scene.frame_subframe)
         tree = own_compositor(copy, made)
@@ -68,9 +67,9 @@ def _composited(scene: bpy.types.Scene) -> NDArray[np.float32]:
         bpy.data.batch_remove(made)
 
 
-def _renders(tree: Any) -> str:
+def _renders(tree: bpy.types.NodeTree) -> str:
     """The name of a node that shows a render and that the output hangs on; empty for none."""
-    found: list[Any] = [n for n in tree.nodes if n.bl_idname == OUTPUT]
+    found: list[bpy.types.Node] = [n for n in tree.nodes if n.bl_idname == OUTPUT]
     seen = set()
     while found:
         node = found.pop()

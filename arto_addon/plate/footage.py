@@ -100,7 +100,7 @@ class Footage:
             on.scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
             return on.composite(scale.outputs["Image"], size, "reading the footage")
 
-    def _picture(self, node: Any) -> bpy.types.NodeSocket:
+    def _picture(self, node: bpy.types.Node) -> bpy.types.NodeSocket:
         """The picture among what a node puts out: of a file of layers there is the beauty. Raises
         SceneError."""
         for name in ("Image", "Combined"):
@@ -187,7 +187,7 @@ class Footage:
         found[..., 3] = 1
         return found
 
-    def _node(self, tree: Any) -> Any:
+    def _node(self, tree: bpy.types.NodeTree) -> bpy.types.Node:
         if isinstance(self.source, bpy.types.MovieClip):
             node = tree.nodes.new("CompositorNodeMovieClip")
             node.clip = self.source

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import platform
 import time
-from typing import Any
 
 import bpy
 
 from ..shot import home
 
 
-def header(scene: bpy.types.Scene) -> dict[str, Any]:
+def header(scene: bpy.types.Scene) -> dict[str, object]:
     """The attributes that Blender's own render of the scene would have, as the artist asks for them
     (Output properties, Metadata); but for its render's time and memory, which there was none of."""
     render = scene.render
@@ -32,7 +31,7 @@ def header(scene: bpy.types.Scene) -> dict[str, Any]:
         "marker": ("Marker", marker.name if marker else ""),
         "hostname": ("Hostname", platform.node()),
     }
-    found: dict[str, Any] = {
+    found: dict[str, object] = {
         name: value
         for flag, (name, value) in fields.items()
         if value and getattr(render, f"use_stamp_{flag}")

@@ -7,7 +7,6 @@ work, only the file of the layers.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import bpy
 
@@ -20,7 +19,7 @@ SOURCE, ALPHA, EXPOSURE = "ARTO Layers", "ARTO Alpha", "ARTO Exposure"
 _BLACK, _WHITE = (0.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0, 1.0)
 
 
-def mixer(path: Path, name: str, share: bpy.types.Image | None = None) -> Any:
+def mixer(path: Path, name: str, share: bpy.types.Image | None = None) -> bpy.types.NodeTree:
     """The node group of that name for the layers in a file.
 
     share: of a plate with shadow catchers, see `plate.node_group`.
@@ -42,7 +41,7 @@ def mixer(path: Path, name: str, share: bpy.types.Image | None = None) -> Any:
     return tree
 
 
-def _new(name: str) -> Any:
+def _new(name: str) -> bpy.types.NodeTree:
     tree = bpy.data.node_groups.new(name, "CompositorNodeTree")
     tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
     tree.interface.new_socket("Alpha", in_out="OUTPUT", socket_type="NodeSocketFloat")
@@ -64,7 +63,7 @@ def _new(name: str) -> Any:
     return tree
 
 
-def _add(tree: Any, source: Any, layer: str) -> None:
+def _add(tree: bpy.types.NodeTree, source: bpy.types.Node, layer: str) -> None:
     """Add a layer to the sum, with its sockets: its gain by its name, and its tint."""
     gain = tree.interface.new_socket(layer, in_out="INPUT", socket_type="NodeSocketFloat")
     gain.default_value, gain.min_value = 1.0, 0.0

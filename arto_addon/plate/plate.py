@@ -61,12 +61,12 @@ def full_file(path: Path) -> Path:
     return path.with_name(f"{path.stem}_full.exr")
 
 
-def shown_file(path: Path, header: dict[str, Any]) -> Path:
+def shown_file(path: Path, header: dict[str, object]) -> Path:
     """What Blender shows of a file of a plate that has this header."""
     return full_file(path) if CROPPED in header else path
 
 
-def header_of(scene: bpy.types.Scene, about: dict[str, str]) -> tuple[dict[str, Any], str]:
+def header_of(scene: bpy.types.Scene, about: dict[str, str]) -> tuple[dict[str, object], str]:
     """A plate's header and colour space."""
     attributes = header(scene) | {f"arto.{k}": v for k, v in about.items()}
     return attributes, working_space()
@@ -188,7 +188,7 @@ def node_group(
     return tree
 
 
-def add_footage(tree: Any, things: Any, share: bpy.types.Image) -> None:
+def add_footage(tree: bpy.types.NodeTree, things: Any, share: bpy.types.Image) -> None:
     """To a group that shows a plate, if it has it not: footage goes in, and comes out behind the
     things, a socket of the tree, and in their shadows."""
     if SHARE in tree.nodes:

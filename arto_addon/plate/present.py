@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import bpy
 
@@ -48,9 +47,10 @@ def present(scene: bpy.types.Scene, path: Path, look: str | None = None) -> bpy.
     node = wire(scene, node_group(image, name, share))
     if node is not None:
         use(scene)
-    else:
-        tree = compositor(scene).name
-        print(f"ARTO: the compositor '{tree}' is linked and stays as it is: add '{name}' to it")
+    elif tree := compositor(scene):
+        print(
+            f"ARTO: the compositor '{tree.name}' is linked and stays as it is: add '{name}' to it"
+        )
     if turned_off(scene):
         print(f"ARTO: the scene's compositor is off: turn Use Nodes on in it to see '{name}'")
     if not bpy.app.background and bpy.context.window_manager.windows:
@@ -85,7 +85,7 @@ def present_frames(
     return image
 
 
-def wire(scene: bpy.types.Scene, group: Any) -> Any:
+def wire(scene: bpy.types.Scene, group: bpy.types.NodeTree) -> bpy.types.Node | None:
     """Put the node group into the scene's compositor, seen through the viewer; return its node.
 
     What the compositor puts out stays what it was: an artist's tree gains the node, and a viewer
@@ -140,7 +140,7 @@ def use(scene: bpy.types.Scene) -> None:
         _take_over(scene, tree, wanted)
 
 
-def _take_over(scene: bpy.types.Scene, tree: Any, node: Any) -> None:
+def _take_over(scene: bpy.types.Scene, tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:
     """Link to a node what the render of the scene's view layer is linked to."""
     taken = []
     layer = layer_of(scene)
@@ -157,7 +157,7 @@ def _take_over(scene: bpy.types.Scene, tree: Any, node: Any) -> None:
     node[TAKEN] = json.dumps(taken)
 
 
-def _give_back(tree: Any, node: Any) -> None:
+def _give_back(tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:
     """Put back what a node took over, where the artist has not linked it otherwise since."""
     for render, out, to, identifier in json.loads(node.get(TAKEN, "[]")):
         if render not in tree.nodes or to not in tree.nodes:

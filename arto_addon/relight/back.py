@@ -33,7 +33,7 @@ WORLD = "ARTO Mix"
 class Mix:
     """What a mixer's node does: by layer its gain times its tint, (3,); exposure: in stops."""
 
-    node: Any
+    node: bpy.types.Node
     exposure: float
 
     def of(self, layer: str) -> NDArray[np.float64]:

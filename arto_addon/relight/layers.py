@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -151,7 +150,7 @@ def write(
     path: Path,
     beauty: NDArray[np.float32],
     layers: dict[str, NDArray[np.float32]],
-    attributes: dict[str, Any],
+    attributes: dict[str, object],
     space: str,
 ) -> Steps:
     """Write layers that sum to a plate (H, W, 4), and it; says how far their sum is off. Raises

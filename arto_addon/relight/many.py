@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import bpy
 
@@ -189,11 +188,11 @@ def _shown(scene: bpy.types.Scene, view_layer: str, still: Shown | None) -> Show
 
 
 @contextmanager
-def _world_showing(file: Path) -> Iterator[Any]:
+def _world_showing(file: Path) -> Iterator[bpy.types.World]:
     """A world that shows an environment map from a file. Raises SceneError."""
     if not file.is_file():
         raise SceneError(f"there is no environment map {file}")
-    made: list[Any] = []
+    made: list[bpy.types.ID] = []
     try:
         try:
             image = bpy.data.images.load(str(file))

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable
-from typing import Any
 
 import bpy
 import numpy as np
@@ -188,7 +187,7 @@ def _rendered(layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
 
 
 def _settings(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> str:
-    parts: list[Any] = [(n, getattr(scene.render, n, None)) for n in _RENDER]
+    parts: list[object] = [(n, getattr(scene.render, n, None)) for n in _RENDER]
     for owner in (scene.cycles, scene.cycles_curves, layer.cycles):
         for prop in owner.bl_rna.properties:
             name = prop.identifier
@@ -202,7 +201,7 @@ def _settings(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> str:
     return hashlib.blake2b(repr(parts).encode(), digest_size=12).hexdigest()
 
 
-def _flags(there: bpy.types.LayerCollection) -> list[Any]:
+def _flags(there: bpy.types.LayerCollection) -> list[object]:
     """Collections that the view layer holds out, or sees only in reflections."""
     own = [(there.name, there.holdout, there.indirect_only)]
     found = own if there.holdout or there.indirect_only else []

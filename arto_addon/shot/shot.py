@@ -51,7 +51,7 @@ def _matrix(camera: bpy.types.Object) -> tuple[float, ...]:
     return tuple(round(x, 5) for row in camera.matrix_world for x in row)
 
 
-def _lens(scene: bpy.types.Scene) -> tuple[Any, ...]:
+def _lens(scene: bpy.types.Scene) -> tuple[object, ...]:
     """What of the camera decides the framing, beside where it stands."""
     if not scene.camera or scene.camera.type != "CAMERA":
         return ()

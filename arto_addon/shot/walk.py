@@ -95,7 +95,7 @@ class Walk:
     def digest(self) -> str:
         return self._hash.hexdigest()
 
-    def _put(self, *values: Any) -> None:
+    def _put(self, *values: object) -> None:
         self._hash.update(repr(values).encode("utf-8", "surrogatepass"))
 
     def _struct(self, value: Any, depth: int) -> None:

@@ -7,7 +7,6 @@ this table, and the panel says where an artist's own setting makes a render look
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import bpy
 
@@ -22,7 +21,7 @@ class Change:
     """
 
     setting: str
-    to: Any
+    to: object
     why: str
     look: str = ""
 
@@ -64,7 +63,7 @@ def prepare(on: Stage, layers: int) -> None:
     """Switch off on the stage whatever would bend the light or take it apart."""
     s = on.scene.arto
     through = on.scene.cycles.transparent_max_bounces + layers
-    words = {SAMPLES: samples_of(on.scene), SEED: s.seed, THROUGH: through}
+    words: dict[object, object] = {SAMPLES: samples_of(on.scene), SEED: s.seed, THROUGH: through}
     for change in CHANGES:
         on.change(change.setting, words.get(change.to, change.to))
     layer = on.scene.view_layers[0]

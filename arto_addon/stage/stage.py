@@ -39,7 +39,7 @@ class Stage:
 
     def __init__(self, scene: bpy.types.Scene) -> None:
         self.scene = scene
-        self.changed: dict[str, list[Any]] = {}
+        self.changed: dict[str, list[object]] = {}
         self.pace: Pace | None = None  # of the last small render
         self.own_groups: list[str] = []  # the artist's light groups that have things in them
         self._made: list[bpy.types.ID] = []
@@ -55,7 +55,7 @@ class Stage:
         self._made = [b for b in self._made if b.as_pointer() not in gone]
         bpy.data.batch_remove(blocks)
 
-    def change(self, path: str, value: Any) -> None:
+    def change(self, path: str, value: object) -> None:
         """Set `scene.<path>`, and note what it was, for the capture set's description."""
         *owners, name = path.split(".")
         target: Any = self.scene

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
 
 import bpy
 
@@ -44,7 +43,7 @@ def take(seen: Rendered, name: str) -> Iterator[list[bpy.types.Object]]:
         yield []
         return
     seen.check()
-    wanted: list[tuple[Any, str, bool]] = []
+    wanted: list[tuple[bpy.types.bpy_struct, str, bool]] = []
     if name == THINGS:
         yield []
         return

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-from typing import Any
 
 import bpy
 
@@ -112,7 +111,7 @@ def _own(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
         sub.prop(group, "gain", text=group.name, translate=False)
 
 
-def mixer_of(scene: bpy.types.Scene) -> Any:
+def mixer_of(scene: bpy.types.Scene) -> bpy.types.Node | None:
     """The node in the scene's compositor that mixes the layers of its plate; None without one."""
     tree, name = compositor(scene), name_of(scene) + MIX
     nodes = tree.nodes if tree else ()

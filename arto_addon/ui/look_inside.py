@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import bpy
 import numpy as np
 
@@ -19,7 +17,9 @@ from .operators import Quick, can_relight, free
 from .reveal import reveal
 
 
-def under(context: bpy.types.Context, event: bpy.types.Event) -> tuple[Any, float, float] | None:
+def under(
+    context: bpy.types.Context, event: bpy.types.Event
+) -> tuple[bpy.types.SpaceImageEditor, float, float] | None:
     """The image editor under the mouse, and where in its picture it is: u, v from the left and the
     bottom, 0 to 1."""
     for area in context.window.screen.areas:
@@ -54,7 +54,9 @@ class _Picking(Quick):
     def begin(self, context: bpy.types.Context) -> None:
         """Before the click. Raises ArtoError."""
 
-    def picked(self, context: bpy.types.Context, space: Any, u: float, v: float) -> str:
+    def picked(
+        self, context: bpy.types.Context, space: bpy.types.SpaceImageEditor, u: float, v: float
+    ) -> str:
         raise NotImplementedError
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -116,7 +118,9 @@ patches with the HDRI on them"""
         if not showing & {name_of(scene), LIVE, inside.FROM}:
             bpy.ops.arto.show_plate()
 
-    def picked(self, context: bpy.types.Context, space: Any, u: float, v: float) -> str:
+    def picked(
+        self, context: bpy.types.Context, space: bpy.types.SpaceImageEditor, u: float, v: float
+    ) -> str:
         if space.image.name in {inside.IMAGE, compare.IMAGE}:
             bpy.ops.arto.show_plate()
             return "That is no pixel of the relit picture: it is shown now, click again"
@@ -147,7 +151,9 @@ from there gives to it"""
         picture = inside.drawn(shown.field.hemicube, environment, [], inside.SIDE, show=0.0)
         reveal(put(inside.IMAGE, picture, display=True))
 
-    def picked(self, context: bpy.types.Context, space: Any, u: float, v: float) -> str:
+    def picked(
+        self, context: bpy.types.Context, space: bpy.types.SpaceImageEditor, u: float, v: float
+    ) -> str:
         direction = inside.direction_at(context.scene, space.image.name, u, v)
         if direction is None:
             return "That is beside the patches: click on them"
@@ -156,7 +162,7 @@ from there gives to it"""
         return text
 
 
-def _spaces(context: bpy.types.Context) -> list[Any]:
+def _spaces(context: bpy.types.Context) -> list[bpy.types.SpaceImageEditor]:
     areas = [a for w in context.window_manager.windows for a in w.screen.areas]
     return [a.spaces.active for a in areas if a.type == "IMAGE_EDITOR"]
 

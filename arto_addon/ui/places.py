@@ -4,7 +4,6 @@ compositor, and the render properties, which have the closed ones too."""
 from __future__ import annotations
 
 import textwrap
-from typing import Any
 
 import bpy
 
@@ -52,12 +51,13 @@ def _panel(name: str, draws: type[Draws], space: str, region: str, end: str, par
             return False
         return draws.shown(context)
 
-    def draw(self: Any, context: bpy.types.Context) -> None:
+    def draw(self: bpy.types.Panel, context: bpy.types.Context) -> None:
         draws.draw_column(self.layout.column(), context)
 
-    attributes: dict[str, Any] = {
+    identifier = f"ARTO_PT_{name}_{end}"
+    attributes: dict[str, object] = {
         "bl_label": draws.label,
-        "bl_idname": f"ARTO_PT_{name}_{end}",
+        "bl_idname": identifier,
         "bl_space_type": space,
         "bl_region_type": region,
         "poll": classmethod(poll),
@@ -75,7 +75,7 @@ def _panel(name: str, draws: type[Draws], space: str, region: str, end: str, par
         attributes["bl_category"] = TAB
         if parent:
             attributes["bl_parent_id"] = f"ARTO_PT_{parent}_{end}"
-    return type(attributes["bl_idname"], (bpy.types.Panel,), attributes)
+    return type(identifier, (bpy.types.Panel,), attributes)
 
 
 def say(

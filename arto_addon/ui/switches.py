@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
 
 import bpy
 from bpy.props import (
@@ -22,11 +22,11 @@ from ..world import controls
 from . import overlay
 
 
-def _get_live(self: Any) -> bool:
+def _get_live(self: ArtoWindow) -> bool:
     return live.current is not None
 
 
-def _set_live(self: Any, on: bool) -> None:
+def _set_live(self: ArtoWindow, on: bool) -> None:
     if not on:
         live.stop()
         return
@@ -37,35 +37,35 @@ def _set_live(self: Any, on: bool) -> None:
 
 
 # named, because Blender reads annotations as texts, in which a lambda knows no module
-def _get_overlay(self: Any) -> bool:
+def _get_overlay(self: ArtoWindow) -> bool:
     return overlay.shown()
 
 
-def _set_overlay(self: Any, on: bool) -> None:
+def _set_overlay(self: ArtoWindow, on: bool) -> None:
     overlay.switch(on)
 
 
-def _get_turn(self: Any) -> float:
+def _get_turn(self: ArtoWorld) -> float:
     return controls.turn(self.id_data)
 
 
-def _set_turn(self: Any, angle: float) -> None:
+def _set_turn(self: ArtoWorld, angle: float) -> None:
     controls.set_turn(self.id_data, angle)
 
 
-def _get_strength(self: Any) -> float:
+def _get_strength(self: ArtoWorld) -> float:
     return controls.strength(self.id_data)
 
 
-def _set_strength(self: Any, value: float) -> None:
+def _set_strength(self: ArtoWorld, value: float) -> None:
     controls.set_strength(self.id_data, value)
 
 
-def _get_tint(self: Any) -> tuple[float, float, float]:
+def _get_tint(self: ArtoWorld) -> tuple[float, float, float]:
     return controls.tint(self.id_data)
 
 
-def _set_tint(self: Any, colour: Any) -> None:
+def _set_tint(self: ArtoWorld, colour: Sequence[float]) -> None:
     controls.set_tint(self.id_data, colour)
 
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import bpy
 
 
-def tr(text: str, **values: Any) -> str:
+def tr(text: str, **values: object) -> str:
     """The sentence in the language of the interface, with its values."""
     out = bpy.app.translations.pgettext_iface(text)
     if not values:

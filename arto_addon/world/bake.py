@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
 import bpy
 import numpy as np
@@ -41,7 +40,7 @@ BLOCK = 32
 LEAST_WIDTH = 1024
 
 
-def _pass_through(made: list[Any], studio: Any) -> None:
+def _pass_through(made: list[bpy.types.ID], studio: bpy.types.Scene) -> None:
     """The box around the camera: what it lets through is no longer a camera ray."""
     material = new_material("ARTO Pass Through")
     tree = material.node_tree
@@ -62,7 +61,7 @@ def _pass_through(made: list[Any], studio: Any) -> None:
     made += [box, mesh, material]
 
 
-def sees_the_camera(world: Any) -> bool:
+def sees_the_camera(world: bpy.types.World) -> bool:
     """Whether a world may look different to the camera than to the scene."""
     rays = world.cycles_visibility
     hidden = not all(
@@ -77,13 +76,13 @@ def sees_the_camera(world: Any) -> bool:
     )
 
 
-def _by_area(world: Any) -> None:
+def _by_area(world: bpy.types.World) -> None:
     """Have a world shine by the cosine of the latitude, which is what a direction of an
     equirectangular map counts for: within a texel with a lamp in it, too, and beside a pole above
     all. (An even texel needs none of it, and would get the noise of it.)"""
     tree = shader_tree(world)
     out = tree.get_output_node("CYCLES") if tree else None
-    if out is None or not out.inputs["Surface"].is_linked:
+    if tree is None or out is None or not out.inputs["Surface"].is_linked:
         return
     nodes = Nodes(tree)
     direction = tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"]
@@ -132,7 +131,7 @@ def _power_of_two(samples: float) -> int:
 
 
 @contextmanager
-def _panorama(scene: bpy.types.Scene, world: bpy.types.World) -> Iterator[Any]:
+def _panorama(scene: bpy.types.Scene, world: bpy.types.World) -> Iterator[bpy.types.Scene]:
     """A studio with a camera that sees all of a world, as the scene's surfaces see it."""
     check_images(world)
     with studio_scene(scene, world, "ARTO World") as (studio, made):

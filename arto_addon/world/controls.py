@@ -6,7 +6,7 @@ Getters run while a panel is drawn and change nothing; setters are called when a
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 import bpy
 
@@ -55,7 +55,7 @@ def tint(world: bpy.types.World) -> tuple[float, float, float]:
     return tuple(node.outputs[0].default_value[:3]) if node else (1.0, 1.0, 1.0)
 
 
-def set_tint(world: bpy.types.World, colour: Any) -> None:
+def set_tint(world: bpy.types.World, colour: Sequence[float]) -> None:
     """Set the colour that a world's light is multiplied by."""
     if not world.library:
         world_of_nodes(world)
@@ -66,7 +66,7 @@ def set_tint(world: bpy.types.World, colour: Any) -> None:
     node.outputs[0].default_value = (*colour[:3], 1.0)
 
 
-def _add_tint(world: bpy.types.World) -> Any:
+def _add_tint(world: bpy.types.World) -> bpy.types.Node:
     tree = world.node_tree
     dial = tree.nodes.new("ShaderNodeRGB")
     dial.name = dial.label = TINT
@@ -94,7 +94,7 @@ def hdri(world: bpy.types.World) -> bpy.types.Image | None:
     return next((n.image for n in texture_nodes(world) if n.image), None)
 
 
-def texture_nodes(world: bpy.types.World) -> list[Any]:
+def texture_nodes(world: bpy.types.World) -> list[bpy.types.Node]:
     """The nodes of a world's own tree that show an HDRI."""
     tree = shader_tree(world)
     kind = "ShaderNodeTexEnvironment"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import bpy
 
@@ -60,9 +59,9 @@ _VALUES = {
 _TURNED = {"NodeReroute", "ShaderNodeMapping", "ShaderNodeTexCoord", "ShaderNodeVectorRotate"}
 
 
-def _above(node: Any, ends: set[str]) -> set[Any]:
+def _above(node: bpy.types.Node, ends: set[str]) -> set[bpy.types.Node]:
     """The nodes that a node's inputs come from, without what lies above nodes of kinds `ends`."""
-    found: set[Any] = set()
+    found: set[bpy.types.Node] = set()
     todo = [node]
     while todo:
         for socket in todo.pop().inputs:
@@ -74,9 +73,9 @@ def _above(node: Any, ends: set[str]) -> set[Any]:
     return found
 
 
-def values_only(node: Any, ends: set[Any]) -> bool:
+def values_only(node: bpy.types.Node, ends: set[bpy.types.Node]) -> bool:
     """Whether what a node is given, down to the nodes `ends`, knows of no direction."""
-    found: set[Any] = set()
+    found: set[bpy.types.Node] = set()
     todo = [node]
     while todo:
         for socket in todo.pop().inputs:
@@ -87,7 +86,7 @@ def values_only(node: Any, ends: set[Any]) -> bool:
     return all(n.bl_idname in _VALUES for n in found)
 
 
-def _of_texture(node: Any) -> int:
+def _of_texture(node: bpy.types.Node) -> int:
     """The width of a map as fine as an environment texture, as its nodes turn it."""
     above = _above(node, set())
     if node.projection != "EQUIRECTANGULAR" or any(n.bl_idname not in _TURNED for n in above):

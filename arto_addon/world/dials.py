@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
 
 import bpy
 
@@ -26,20 +25,20 @@ _PICTURES = {"ShaderNodeTexEnvironment", "ShaderNodeTexSky"}
 _SOURCES = {"ShaderNodeTexCoord", "ShaderNodeMapping", "ShaderNodeNewGeometry"}
 
 
-def backgrounds(world: bpy.types.World) -> list[Any]:
+def backgrounds(world: bpy.types.World) -> list[bpy.types.Node]:
     """The background nodes of a world's own tree."""
     tree = shader_tree(world)
     return [n for n in tree.nodes if n.bl_idname == "ShaderNodeBackground"] if tree else []
 
 
-def _pictures(world: bpy.types.World) -> list[Any]:
+def _pictures(world: bpy.types.World) -> list[bpy.types.Node]:
     """The nodes of a world's own tree that show a picture by its socket Vector."""
     tree = shader_tree(world)
     found = [n for n in tree.nodes if n.bl_idname in _PICTURES] if tree else []
     return [n for n in found if "Vector" in n.inputs and not n.inputs["Vector"].is_unavailable]
 
 
-def _groups(world: bpy.types.World) -> list[Any]:
+def _groups(world: bpy.types.World) -> list[bpy.types.Node]:
     """The group nodes of a world's own tree in which a picture is."""
     tree = shader_tree(world)
     return [
@@ -50,10 +49,10 @@ def _groups(world: bpy.types.World) -> list[Any]:
     ]
 
 
-def _mappings_before(sockets: Iterable[Any]) -> list[Any]:
+def _mappings_before(sockets: Iterable[bpy.types.NodeSocket]) -> list[bpy.types.Node]:
     """The first mapping nodes on the ways that lead to sockets, each once."""
-    found: list[Any] = []
-    seen: list[Any] = []
+    found: list[bpy.types.Node] = []
+    seen: list[bpy.types.Node] = []
     todo = list(sockets)
     while todo:
         for link in todo.pop().links:
@@ -68,7 +67,7 @@ def _mappings_before(sockets: Iterable[Any]) -> list[Any]:
     return found
 
 
-def turner(world: bpy.types.World) -> Any:
+def turner(world: bpy.types.World) -> bpy.types.Node | None:
     """The mapping node that turns all pictures of a world; None where there is none, or where
     several do, or where its rotation is worked out by other nodes."""
     ways = [[picture.inputs["Vector"]] for picture in _pictures(world)]
@@ -99,7 +98,7 @@ def why_not_turned(world: bpy.types.World) -> str:
     return ""
 
 
-def _source(picture: Any) -> tuple[str, str, str]:
+def _source(picture: bpy.types.Node) -> tuple[str, str, str]:
     """What a picture's direction comes from: kind of node, its name where it is a mapping node (of
     the others, one is as good as another), and the socket."""
     links = picture.inputs["Vector"].links
@@ -110,7 +109,7 @@ def _source(picture: Any) -> tuple[str, str, str]:
     return node.bl_idname, name, links[0].from_socket.name
 
 
-def put_in_turner(world: bpy.types.World) -> Any:
+def put_in_turner(world: bpy.types.World) -> bpy.types.Node:
     """A new mapping node that turns all pictures of a world, which `why_not_turned` lets be."""
     tree, pictures = world.node_tree, _pictures(world)
     node = tree.nodes.new("ShaderNodeMapping")
@@ -132,7 +131,7 @@ def put_in_turner(world: bpy.types.World) -> Any:
     return node
 
 
-def scaler(world: bpy.types.World) -> Any:
+def scaler(world: bpy.types.World) -> bpy.types.NodeSocket | None:
     """The socket that says how bright all of a world is; None where there is no such one."""
     tree = shader_tree(world)
     if tree is None:
@@ -146,7 +145,7 @@ def scaler(world: bpy.types.World) -> Any:
     return None
 
 
-def put_in_scaler(world: bpy.types.World) -> Any:
+def put_in_scaler(world: bpy.types.World) -> bpy.types.NodeSocket:
     """A new socket that all backgrounds of a world are multiplied by, with 1 in it."""
     tree = world.node_tree
     dial = tree.nodes.new("ShaderNodeValue")
@@ -168,14 +167,14 @@ def put_in_scaler(world: bpy.types.World) -> Any:
     return dial.outputs[0]
 
 
-def whole(world: bpy.types.World) -> tuple[Any, Any]:
+def whole(world: bpy.types.World) -> tuple[bpy.types.Node | None, bpy.types.Node | None]:
     """The background node whose strength is that of all the world's light, and the mapping node of
     which every picture of it hangs, so that a turn of the node is a turn of the light; None where
     there is no such one."""
     tree = shader_tree(world)
     out = tree.get_output_node("CYCLES") if tree else None
     links = out.inputs["Surface"].links if out else ()
-    if not links or links[0].is_muted:
+    if tree is None or not links or links[0].is_muted:
         return None, None
     background = links[0].from_node
     if background.bl_idname != "ShaderNodeBackground" or background.mute:
@@ -210,7 +209,7 @@ def whole(world: bpy.types.World) -> tuple[Any, Any]:
     return dial, mapping if turns else None
 
 
-def read(world: bpy.types.World) -> tuple[float, float, list[Any]]:
+def read(world: bpy.types.World) -> tuple[float, float, list[bpy.types.Node]]:
     """The strength and turn that stand for all of a world, and the sockets that say so."""
     background, mapping = whole(world)
     sockets = []

@@ -109,7 +109,7 @@ def _write(path: Path, image: np.ndarray) -> None:
 
 def _key(scene: bpy.types.Scene, world: bpy.types.World, width: int) -> str:
     """What a map hangs on, in sixteen letters."""
-    of: list[Any] = [VERSION, width, bpy.app.version_string, working_space()]
+    of: list[object] = [VERSION, width, bpy.app.version_string, working_space()]
     # a copy of the world has another name
     # by what is in the files: an HDRI may be replaced by one of the same size and time
     found = of_blocks([world], full=True)
@@ -136,7 +136,7 @@ def shows(scene: bpy.types.Scene, world: bpy.types.World) -> tuple[str, float, f
     Quick, and nothing is changed or copied: for who looks many times a second.
     """
     strength, turn, dials = read(world)
-    of: list[Any] = sorted(of_blocks([world], without=dials).items())
+    of: list[object] = [*sorted(of_blocks([world], without=dials).items())]
     if moving_images(world):
         of.append((scene.frame_current, scene.frame_subframe))
     return repr(of), strength, turn

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from typing import Any
 
 import bpy
 import numpy as np
@@ -28,7 +27,7 @@ from ..stage.takes import WHOLE, take
 from ..work import Steps
 
 
-def world_showing(on: Stage, shown: Environment, group: str = "") -> Any:
+def world_showing(on: Stage, shown: Environment, group: str = "") -> bpy.types.World:
     """A world that shows a map, in a light group of its own where one is named."""
     height, width = shown.image.shape[:2]
     image = on.made(

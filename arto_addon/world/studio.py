@@ -6,7 +6,6 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -20,14 +19,14 @@ from ..work import Render, blocking_render
 @contextmanager
 def studio_scene(
     scene: bpy.types.Scene, world: bpy.types.World, name: str
-) -> Iterator[tuple[Any, list[Any]]]:
+) -> Iterator[tuple[bpy.types.Scene, list[bpy.types.ID]]]:
     """A new scene with a world of the artist's, the scene's frame and nothing else; removed at the
     end.
 
     Yields the scene and the list of data-blocks to remove with it.
     """
     studio = bpy.data.scenes.new(name)
-    made: list[Any] = []
+    made: list[bpy.types.ID] = []
     try:
         studio.render.engine = "CYCLES"
         studio.world = world.copy()
@@ -49,7 +48,7 @@ def studio_scene(
         bpy.data.batch_remove([*made, studio])
 
 
-def render(studio: Any) -> NDArray[np.float32]:
+def render(studio: bpy.types.Scene) -> NDArray[np.float32]:
     """Render a studio scene -> (H, W, 4) float32, rows top-down."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "picture.exr"
