@@ -56,6 +56,15 @@ def _stability(options: argparse.Namespace) -> None:
     print(table(rows))
 
 
+def _safety(options: argparse.Namespace) -> None:
+    from .machine import write_rows
+    from .safety import safety, table
+
+    rows = safety()
+    write_rows(options.json, rows)
+    print(table(rows))
+
+
 def _models(options: argparse.Namespace) -> None:
     from . import scenes, worlds
     from .models import models, table
@@ -249,6 +258,10 @@ def main() -> int:
     c = commands.add_parser("stability", help="hard synthetic cases for every support model")
     c.add_argument("--json", type=Path, default=Path("out/stability.json"))
     c.set_defaults(run=_stability)
+
+    c = commands.add_parser("safety", help="damages and files of others: what comes of each")
+    c.add_argument("--json", type=Path, default=Path("out/stability.json"))
+    c.set_defaults(run=_safety)
 
     c = commands.add_parser("models", help="every support model on the same captures")
     c.add_argument("--json", type=Path, default=Path("out/models.json"))
