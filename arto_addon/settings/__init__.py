@@ -1,1 +1,1 @@
-"""What the artist may choose: each setting said once, in a table that needs no Blender."""
+"""The settings that the artist may choose, each described once. This folder needs no Blender."""

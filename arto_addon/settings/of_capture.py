@@ -1,4 +1,4 @@
-"""Settings of a capture and its fit: patches, patterns, samples, what is kept."""
+"""Settings of a capture and of its fit: patches, patterns, samples, and what stays on disk."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ HEMICUBE = (
         ),
         default="full",
         work="hemicube",
-        # by the faces that it sets
+        # A preset sets the faces, and the key has the faces.
         decides=Decides.CAPTURE_MADE,
         farm=True,
         option=True,
@@ -166,7 +166,8 @@ HEMICUBE = (
         panels=("Method",),
     ),
 )
-# The samples come before the quality: who sets them sets it.
+# Setting the samples also sets the quality to Custom. So the samples come first: a quality that is
+# given as well is set after them, and counts.
 CAPTURE = (
     Setting(
         name="samples",

@@ -1,10 +1,11 @@
-"""Settings of a relight: its light, and which files are written."""
+"""Settings of a relight: the light of the picture, and which files are written."""
 
 from __future__ import annotations
 
 from .setting import Decides, Setting
 
-# What is asked of the light. Its order is that of the options, and of the key of a plate's light.
+# Settings of the light. The order is also the order of the command line's options, and of the
+# values in the key of a plate's light.
 LIGHT = (
     Setting(
         name="own_lamps",
@@ -58,7 +59,7 @@ LIGHT = (
         default=True,
         work="relight",
         decides=Decides.PLATE,
-        # albedo and normal are denoised by those who fit them
+        # The machine that fits a tile also denoises the tile's albedo and normals.
         farm=True,
         option=True,
         panels=("Quality",),

@@ -1,4 +1,4 @@
-"""Settings of what a relit picture is shown by in Blender, and what the artist makes lists of."""
+"""Settings of how Blender's window shows a relit picture, and the lists that the artist makes."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """A setting, and all that is known of it.
 
-The properties on `scene.arto`, the options of the command line, a farm's job, and the keys by which
-captures and plates are compared are made of what a `Setting` says. It needs no Blender.
+A `Setting` is the one source for the property on `scene.arto`, the option of the command line, the
+entry in a farm's job, and the part of a key by which captures and plates are compared. This module
+needs no Blender.
 """
 
 from __future__ import annotations
@@ -10,11 +11,11 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Literal
 
-# What a setting holds. choice: one of its items; choices: any number of them; image: an image of
-# the file; list: entries that are made in the panels, see `ui.lists`.
+# What a setting holds. choice: one of the setting's items; choices: any number of the items; image:
+# an image of the .blend; list: entries that are made in the panels, see `ui.lists`.
 Kind = Literal["switch", "whole", "number", "text", "choice", "choices", "image", "list"]
-# The piece of work that reads it. hemicube: a capture, to build its hemicube; shot: all work, to
-# find the shot's files.
+# The piece of work that reads a setting. hemicube: a capture, to build its hemicube; shot: all
+# work, to find the shot's files.
 Work = Literal["hemicube", "capture", "fit", "relight", "shot"]
 # Titles of the panels, see `ui.panels`.
 Panel = Literal["Shot", "Light", "Result", "Quality", "Layers", "Storage", "Method"]
@@ -23,18 +24,22 @@ Item = tuple[str, str, str]
 
 
 class Decides(Enum):
-    """What is another one when the value of a setting is another one, and how its key says so."""
+    """Whether a new value of a setting makes a new capture or a new plate, and what the key has.
+
+    Two captures, or two plates, are the same where their keys are equal.
+    """
 
     NOTHING = "nothing"
     # The key of a capture has the value itself.
     CAPTURE = "capture"
     # The key of a capture has what is made of the value: hemicube, patterns, number of samples.
     CAPTURE_MADE = "capture, by what is made of it"
-    # The value says how the picture is cut into tiles.
+    # The value decides how the picture is cut into tiles.
     CAPTURE_TILES = "capture, by its tiles"
-    # The value says which basis images are kept.
+    # The value decides which basis images are kept.
     CAPTURE_KEPT = "capture, by what is kept of it"
-    # The value decides where the basis images need not be kept: the fit is then all that stays.
+    # The value counts unless `keep` is "always": a field cannot be fitted again without its basis
+    # images, so another fit needs another capture.
     CAPTURE_FIT = "capture, by its fit"
     # The key of a plate's light has the value itself.
     PLATE = "plate"
@@ -43,12 +48,12 @@ class Decides(Enum):
 
     @property
     def of_capture(self) -> bool:
-        """Whether captures under two values are two captures."""
+        """Whether a new value of the setting makes a new capture."""
         return self.name.startswith("CAPTURE")
 
     @property
     def of_plate(self) -> bool:
-        """Whether plates under two values are two plates."""
+        """Whether a new value of the setting makes a new plate."""
         return self.name.startswith("PLATE")
 
 
@@ -59,35 +64,36 @@ class Setting:
     Parameters
     ----------
     name
-        Its identifier on `scene.arto` and in a farm's job. The command line's option is the name
-        with dashes.
+        The setting's identifier on `scene.arto` and in a farm's job. The command line's option is
+        the name with dashes.
     kind
-        What it holds.
+        What the setting holds.
     title, words
-        Its name and its description in the interface. The description is also the option's help.
+        The setting's name and description in the interface. The description is also the help of
+        the command line's option.
     default
-        Its value in a new scene; None for images and lists.
+        The value in a new scene; None for images and lists.
     work
-        The piece of work that reads it.
+        The piece of work that reads the setting.
     decides
-        Whether two captures, or two plates, are the same where the setting is not.
+        Whether a new value makes a new capture or a new plate.
     farm
-        Whether it goes to the machines of a farm.
+        Whether the setting goes to the machines of a farm.
     option
-        Whether the command line has an option for it.
+        Whether the command line has an option for the setting.
     panels
-        The panels in which it stands.
+        The panels that show the setting.
     items
-        Of a choice, in the order of the menu. Their places are in artists' files: a new one goes to
-        the end.
+        The items of a choice, in the order of the menu. Artists' files store the place of an item
+        in this order, so a new item goes to the end.
     least, most
-        Bounds of a number; None for none.
+        Bounds of a number; None where there is no bound.
     soft_least, soft_most
         Bounds of a number's slider; None for the bounds of the number.
     subtype
-        Blender's, for units and paths.
+        Blender's subtype of the property, for units and paths.
     hidden
-        Whether it is nothing to be shown.
+        Whether the interface never shows the setting.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""All settings of a scene, and what is asked of them."""
+"""The table of all settings of a scene, and functions that pick some of them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SHOT = (
         work="shot",
         decides=Decides.NOTHING,
         farm=False,
-        # every verb has it, beside the scene's name
+        # Every verb of the command line has an option for the folder already.
         option=False,
         panels=("Storage",),
     ),
@@ -39,37 +39,37 @@ SHOT = (
         panels=(),
     ),
 )
-# The order of the command line's options, and of the settings in a farm's job.
+# This order is the order of the command line's options, and of the settings in a farm's job.
 SETTINGS = (*HEMICUBE, *CAPTURE, *FIT, *LIGHT, *FILES, *SHOWN, *SHOT)
-# What of the settings a capture on a farm reads, its fit and the denoising of its guides; not where
-# files are on a machine. A preset sets faces, and samples the quality: they come before what they
-# set.
+# The settings that a capture on a farm reads, for its renders, its fit and the denoising of its
+# guides. Paths on a machine are not among them. Setting the preset also sets the faces, and setting
+# the samples also sets the quality. So the preset and the samples come before what they set.
 FARM = tuple(s.name for s in SETTINGS if s.farm)
 
 
 def options(*work: Work) -> tuple[Setting, ...]:
-    """The settings of pieces of work that the command line has an option for."""
+    """List the settings of some pieces of work that have an option on the command line."""
     return tuple(s for s in SETTINGS if s.option and s.work in work)
 
 
 def in_panel(panel: Panel, work: Work) -> tuple[str, ...]:
-    """The names of the settings of a piece of work that stand in a panel."""
+    """List the names of a piece of work's settings that a panel shows."""
     return tuple(s.name for s in SETTINGS if panel in s.panels and s.work == work)
 
 
 def values(of: Any, decides: Decides) -> dict[str, Any]:
-    """The values of the settings that decide in one way.
+    """Read the values of all settings whose `decides` is the given one.
 
     Parameters
     ----------
     of
-        `scene.arto`, or what has its attributes.
+        `scene.arto`, or an object with the same attributes.
     decides
-        The way.
+        What a new value of the setting makes new.
 
     Returns
     -------
     dict
-        Value by name, in the order of the table.
+        The values by the settings' names, in the order of the table.
     """
     return {s.name: getattr(of, s.name) for s in SETTINGS if s.decides is decides}
