@@ -21,6 +21,7 @@ from arto.arto_addon.fit import fit
 from arto.arto_addon.relight import relight
 from arto.core import exr, metrics
 from arto.core.capture.capture_set import CaptureSet
+from arto.core.capture.head import CaptureHead
 from arto.core.errors import ArtoError
 
 from . import reference, worlds
@@ -56,7 +57,7 @@ def _cycles(
         bpy.data.scenes.remove(copy)
 
 
-def _relit(scene: bpy.types.Scene, folder: Path) -> tuple[np.ndarray, dict[str, Any]]:
+def _relit(scene: bpy.types.Scene, folder: Path) -> tuple[np.ndarray, CaptureHead]:
     """Capture, fit, relight -> the plate (H, W, 3), and what the capture set says. Raises
     ArtoError."""
     scene.arto.folder, scene.arto.output = str(folder / "arto"), str(folder / "relit.exr")
@@ -105,8 +106,8 @@ def one(name: str, hdri: str = "sunset") -> dict[str, Any]:
     good = row["error"] <= max(row["denoised_render"], row["noise_floor"]) + BEHIND
     if not (good and abs(row["bias"]) < BIAS + row["bias_of_noise"]):
         row["status"] = "wrong"
-    if head.get("caution"):
-        row |= {"status": f"{row['status']}, said", "text": head["caution"]["text"]}
+    if head.caution:
+        row |= {"status": f"{row['status']}, said", "text": head.caution.text}
     row["seconds"] = time.perf_counter() - begun
     return row
 

@@ -9,13 +9,15 @@ import hashlib
 import json
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import bpy
 
-from ...core.capture.capture_set import VERSION, describe
+from ...core.capture.head import VERSION, CaptureHead
+from ...core.capture.kinds import Keep, Route, Take
+from ...core.capture.tile_entry import TileEntry
 from ...core.errors import SceneError
 from ...core.hemicube import Hemicube
 from ...core.patterns import pattern_set
@@ -54,9 +56,9 @@ def geometry(scene: bpy.types.Scene, seen: Rendered) -> Hemicube:
 @dataclass(frozen=True)
 class Asked:
     """A capture that was asked for, on its stage. hemicube: before it is refined; key: the same for
-    the very same capture alone; decides: what of it goes into the description; catchers: whether
-    there are shadow catchers, see `takes`; otherwise: the objects that the take has otherwise than
-    the artist."""
+    the very same capture alone; head: what it begins with, before anything is looked at; catchers:
+    whether there are shadow catchers, see `takes`; otherwise: the objects that the take has
+    otherwise than the artist."""
 
     scene: bpy.types.Scene
     view_layer: str
@@ -67,14 +69,14 @@ class Asked:
     shot: Shot
     found: dict[str, str]
     key: str
-    decides: dict[str, Any]
+    head: CaptureHead
     catchers: bool
     otherwise: list[bpy.types.Object]
 
 
 @contextmanager
 def asked(
-    scene: bpy.types.Scene, view_layer: str, given: Given | None = None, name: str = WHOLE
+    scene: bpy.types.Scene, view_layer: str, given: Given | None = None, name: Take = WHOLE
 ) -> Iterator[Asked]:
     """Set the stage for a capture. given: see there; name: of the take. Raises SceneError."""
     settings = scene.arto
@@ -86,7 +88,7 @@ def asked(
         otherwise = held.enter_context(take(seen, name))
         hemicube = given.hemicube if given else geometry(scene, seen)
         # between renders the paths differ, and grain would not be theirs
-        grain = settings.grain and settings.route == "all"
+        grain = settings.grain and settings.route == Route.ALL
         patterns = pattern_set(settings.patterns)
         prepare(on, layers=len(patterns) + grain)
         # one of hundreds of passes; the takes beside the first hand on nothing but light
@@ -94,21 +96,26 @@ def asked(
         if name == THINGS:
             only_things(on.scene.view_layers[0])
         shot = shot_of(scene, view_layer, region)
-        decides = {
-            "samples": samples_of(scene),
-            **values(settings, Decides.CAPTURE),
-            "grain": grain,
-            "blender": bpy.app.version_string,
-            "colour_space": working_space(),
-            "film_transparent": scene.render.film_transparent,
-            "changed": on.changed,
-        }
-        if seen.catchers:
-            decides |= {"catchers": sorted(set(seen.catchers)), "take": name}
+        head = CaptureHead(
+            hemicube=hemicube,
+            patterns=patterns,
+            height=shot.height,
+            width=shot.width,
+            samples=samples_of(scene),
+            blender=bpy.app.version_string,
+            colour_space=working_space(),
+            film_transparent=scene.render.film_transparent,
+            changed=dict(on.changed),
+            catchers=tuple(sorted(set(seen.catchers))) if seen.catchers else None,
+            take=name if seen.catchers else None,
+            **(
+                values(settings, Decides.CAPTURE) | {"route": Route(settings.route), "grain": grain}
+            ),
+        )
         # names are not in it: a renamed file or scene goes on with what it has
         frame = [shot.camera_matrix, shot.lens, shot.frame, shot.subframe, shot.view_layer]
         everything: list[Any] = [
-            describe(hemicube, patterns, (shot.height, shot.width), **decides),
+            head.to_json(),
             vars(region),
             frame,
             *values(settings, Decides.CAPTURE_TILES).values(),
@@ -116,12 +123,12 @@ def asked(
             VERSION,
             *values(settings, Decides.CAPTURE_KEPT).values(),
         ]
-        if settings.keep != "always":
+        if settings.keep != Keep.ALWAYS:
             everything += values(settings, Decides.CAPTURE_FIT).values()
         key = hashlib.sha256(json.dumps(everything, sort_keys=True).encode()).hexdigest()[:16]
         catchers = bool(seen.catchers)
         yield Asked(
-            scene, view_layer, on, hemicube, region, grain, shot, found, key, decides, catchers,
+            scene, view_layer, on, hemicube, region, grain, shot, found, key, head, catchers,
             otherwise,
         )  # fmt: skip
 
@@ -129,8 +136,8 @@ def asked(
 def begun(
     this: Asked, folder: Path, given: Given | None, strips: int | None = None, takes: int = 1
 ) -> Steps:
-    """Look at the scene and plan the capture -> (`Planned`, the description of its capture set,
-    with no tile rendered yet).
+    """Look at the scene and plan the capture -> (`Planned`, the head of its capture set, with
+    no tile rendered yet).
 
     folder: where it will be; strips: into how many tiles the picture is cut (default: as the memory
     says); takes: see `planned`. Raises SceneError.
@@ -139,27 +146,23 @@ def begun(
     plan: Planned = yield from planned(
         this.scene, this.on, this.hemicube, this.region, this.grain, folder, given, strips, takes
     )
-    about = {
-        "scene": this.scene.name,
-        "file": home.file(),
-        "view_layer": this.view_layer,
-        "shot": this.shot.to_json(),
-        "frame": this.scene.frame_current,
-        "fingerprint": this.found,
-        "caution": plan.caution,
-    }
-    decides = this.decides | {
-        "route": plan.route,
-        "grain": plan.grain,
-        "kept": plan.kept,
-        "choice": settings.support,
-        "separate": settings.separate,
-    }
-    size = (this.shot.height, this.shot.width)
-    patterns = pattern_set(settings.patterns)
-    head = describe(plan.hemicube, patterns, size, key=this.key, **decides, **about)
-    head["seconds"] = 0.0
-    head["tiles"] = [
-        {"region": [t.x, t.y, t.width, t.height], "files": [], "done": False} for t in plan.tiles
-    ]
+    head = replace(
+        this.head,
+        hemicube=plan.hemicube,
+        tiles=tuple(TileEntry(region) for region in plan.tiles),
+        key=this.key,
+        route=plan.route,
+        grain=plan.grain,
+        kept=plan.kept,
+        choice=settings.support,
+        separate=settings.separate,
+        scene=this.scene.name,
+        file=home.file(),
+        view_layer=this.view_layer,
+        shot=this.shot,
+        frame=this.scene.frame_current,
+        fingerprint=this.found,
+        caution=plan.caution,
+        seconds=0.0,
+    )
     return plan, head

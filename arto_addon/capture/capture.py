@@ -5,20 +5,20 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import bpy
 
 from ...core import exr
-from ...core.capture.capture_set import write_header
+from ...core.capture import head as heads
+from ...core.capture.head import CaptureHead
+from ...core.capture.kinds import Keep, Route, Take
 from ...core.capture.names import GRAIN, GROUP, group_name
 from ...core.errors import ArtoError, CaptureSetError
 from ...core.files import Lock, whole
 from ...core.fit.choice import check as check_choice
-from ...core.hemicube import Hemicube
 from ...core.patterns import pattern_set
-from ...core.region import Region
 from ..blender.output import write_to
 from ..fit.guides import cleaned
 from ..shot import paths
@@ -29,7 +29,7 @@ from ..work import Progress, Render, Steps
 from . import beside, planes
 from .asked import asked, begun
 from .check import check_scene
-from .plan import SAMPLED, render_plan
+from .plan import render_plan
 from .planned import Given
 from .resume import empty, empty_take, finish, finish_field, let_go, unfinished
 from .stream import Stream
@@ -68,7 +68,7 @@ def capture(
     check_scene(scene, view_layer)
     # whatever a script has moved is where it should be
     scene.view_layers[view_layer].update()
-    if scene.arto.keep == "never":
+    if scene.arto.keep == Keep.NEVER:
         check_choice(scene.arto.support, pattern_set(scene.arto.patterns), scene.arto.separate)
     claimed = paths.claim(scene, view_layer)
     with Lock(claimed, f"capturing {shot_of(scene, view_layer).title}"):
@@ -92,7 +92,7 @@ def _capture(
             if only_estimate:
                 return plan.estimate
             empty(folder)
-        yield from _render_tiles(this.on, folder, head)
+        head = yield from _render_tiles(this.on, folder, head)
     made = [(folder, claimed, head)]
     for name in takes.TAKES if this.catchers else ():
         steps = _capture_beside(scene, view_layer, claimed / name, name, head, stopped)
@@ -106,8 +106,8 @@ def _capture(
         for name in takes.TAKES:
             empty_take(claimed / name)
     paths.forget()
-    caution = f". CAUTION: {head['caution']['text']}" if head.get("caution") else ""
-    yield Progress(1.0, f"captured {head['patches']} patches{caution}")
+    caution = f". CAUTION: {head.caution.text}" if head.caution else ""
+    yield Progress(1.0, f"captured {len(head.hemicube)} patches{caution}")
     return claimed / "capture"
 
 
@@ -115,98 +115,99 @@ def _capture_beside(
     scene: bpy.types.Scene,
     view_layer: str,
     place: Path,
-    name: str,
-    first: dict[str, Any],
+    name: Take,
+    first: CaptureHead,
     stopped: bool,
 ) -> Steps:
-    """Render a take beside the one of everything, which `first` describes -> where it is, where it
-    belongs, its description. stopped: whether this goes on with a capture that was stopped; then
+    """Render a take beside the one of everything, whose head is `first` -> where it is, where it
+    belongs, its head. stopped: whether this goes on with a capture that was stopped; then
     None where the take is there already."""
     given = beside.given_by(first)
     with asked(scene, view_layer, given, name) as this:
         folder = paths.unfinished_folder(place, this.key)
         head = unfinished(folder, this.key)
         there = place / "capture"
-        if head is None and stopped and beside.is_there(there, this.key, first["key"]):
+        if head is None and stopped and beside.is_there(there, this.key, first.key):
             return None
         if head is None:
-            _, head = yield from begun(this, folder, given, len(first["tiles"]))
+            _, head = yield from begun(this, folder, given, len(first.tiles))
             empty(folder)
-        head[takes.PAIR] = first["key"]
-        yield from _render_tiles(this.on, folder, head)
+        head = yield from _render_tiles(this.on, folder, replace(head, pair=first.key))
     return folder, place, head
 
 
-def _finish(scene: bpy.types.Scene, unfinished: Path, place: Path, head: dict[str, Any]) -> Steps:
+def _finish(scene: bpy.types.Scene, unfinished: Path, place: Path, head: CaptureHead) -> Steps:
     """Put a complete take, and its field where it was fitted as it came, where the last one is."""
-    if not head["kept"]:
+    if not head.kept:
         finish_field(unfinished, place / "field", head)
         yield from cleaned(scene, place / "field")
     finish(unfinished, place / "capture")
 
 
-def _render_tiles(on: Stage, folder: Path, head: dict[str, Any]) -> Steps:
-    """Render what is not there yet of a capture set, and fit it where it is not kept."""
-    tiles = [Region(*t["region"]) for t in head["tiles"]]
-    stream = None if head["kept"] else Stream(folder)
-    write_header(folder, head)
+def _render_tiles(on: Stage, folder: Path, head: CaptureHead) -> Steps:
+    """Render what is not there yet of a capture set, and fit it where it is not kept -> the head of
+    the complete set."""
+    tiles = len(head.tiles)
+    stream = None if head.kept else Stream(folder)
+    heads.write(folder, head)
 
     def take(patience: float | None) -> bool:
         """Note down the tile that was fitted; whether one still is being fitted."""
+        nonlocal head
         if stream and (ended := stream.ended(patience)):
             number, fitted = ended
-            let_go(folder, head, number, fitted)
+            head = let_go(folder, head, number, fitted)
         return stream is not None and stream.busy
 
     def fit(number: int) -> Iterator[Progress]:
         while take(0.1):
-            yield Progress((number + 0.5) / len(tiles), f"fitting tile {number} of {len(tiles)}")
+            yield Progress((number + 0.5) / tiles, f"fitting tile {number} of {tiles}")
         if stream:
             stream.start(number)
 
     try:
-        for t in range(len(tiles)):
-            entry = head["tiles"][t]
-            if entry["done"]:
-                yield Progress((t + 1) / len(tiles), f"tile {t + 1} of {len(tiles)} is there")
-                if stream and "fitted" not in entry:
+        for t in range(tiles):
+            entry = head.tiles[t]
+            if entry.done:
+                yield Progress((t + 1) / tiles, f"tile {t + 1} of {tiles} is there")
+                if stream and entry.fitted is None:
                     yield from fit(t)
                 continue
             begun_at = time.perf_counter()
-            entry["files"] = yield from render_tile(on, head, t, folder)
-            head["seconds"] += time.perf_counter() - begun_at
-            entry["done"] = True
-            write_header(folder, head)
+            files = yield from render_tile(on, head, t, folder)
+            seconds = (head.seconds or 0.0) + time.perf_counter() - begun_at
+            head = replace(head.with_tile(t, files=tuple(files), done=True), seconds=seconds)
+            heads.write(folder, head)
             take(0.0)
             yield from fit(t)
         while take(0.1):
-            yield Progress(0.99, f"fitting tile {len(tiles)} of {len(tiles)}")
+            yield Progress(0.99, f"fitting tile {tiles} of {tiles}")
     finally:
         if stream:
             stream.stop()
+    return head
 
 
-def plan_of(head: dict[str, Any]) -> list[list[tuple[int, str]]]:
-    """The (patch, pattern name) images of each render of a tile, from a set's description."""
-    names = [*pattern_set(head["patterns"]).patterns, *([GRAIN] if head["grain"] else [])]
-    return render_plan(head["route"], Hemicube.from_json(head["hemicube"]), names)
+def plan_of(head: CaptureHead) -> list[list[tuple[int, str]]]:
+    """The (patch, pattern name) images of each render of a tile. Raises CaptureSetError."""
+    names = [*head.patterns.patterns, *([GRAIN] if head.grain else [])]
+    return render_plan(head.told_route, head.hemicube, names)
 
 
 def set_tile(
-    on: Stage, head: dict[str, Any], number: int, images: list[tuple[int, str]]
+    on: Stage, head: CaptureHead, number: int, images: list[tuple[int, str]]
 ) -> AbstractContextManager[None]:
-    """The stage ready for a render of some images of a tile, from a set's description."""
-    set_region(on.scene, Region(*head["tiles"][number]["region"]))
-    hemicube, patterns = Hemicube.from_json(head["hemicube"]), pattern_set(head["patterns"])
+    """The stage ready for a render of some images of a tile."""
+    set_region(on.scene, head.tiles[number].region)
     # the scene's own lamps are in every render; the first shows them by group
-    sampled = head["route"] == SAMPLED
+    sampled = head.route == Route.SAMPLED
     own = not sampled and images == plan_of(head)[0]
-    return planes.lit(on, hemicube, patterns, images, sampled, own)
+    return planes.lit(on, head.hemicube, head.patterns, images, sampled, own)
 
 
-def render_tile(on: Stage, head: dict[str, Any], number: int, folder: Path) -> Steps:
+def render_tile(on: Stage, head: CaptureHead, number: int, folder: Path) -> Steps:
     """Render what is not there yet of a tile into a folder -> the names of its files."""
-    plan, tiles = plan_of(head), len(head["tiles"])
+    plan, tiles = plan_of(head), len(head.tiles)
     total = len(plan) * tiles
     files = []
     for i, images in enumerate(plan):

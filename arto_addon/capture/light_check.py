@@ -7,13 +7,12 @@ its materials, known here or not, shows as a difference.
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import Any
 
 import bpy
 import numpy as np
 
-from ...core.capture.agreement import DIFFERENT, SUSPECTED, Agreement, agreement
+from ...core.capture.agreement import DIFFERENT, SUSPECTED, Agreement, Caution, agreement
 from ...core.capture.names import combined
 from ...core.hemicube import Hemicube
 from ...core.light.environment import Environment, directions, sample_directions
@@ -35,7 +34,7 @@ def check_light(on: Stage, hemicube: Hemicube) -> Steps:
 
     -> (whether the patches must be sampled, a warning or None). Light that only shadow rays bring
     reaches the picture from patches that they are cast at; then that is what is to be done, and the
-    warning says what it costs. A warning is `{"text": ..., "ratio": ..., ...}`, `Agreement`.
+    warning says what it costs. A warning is a `Caution`.
     Raises CancelledError; the stage is left as it was.
     """
     seed = on.scene.cycles.seed
@@ -73,7 +72,7 @@ def check_light(on: Stage, hemicube: Hemicube) -> Steps:
     if not text:
         return False, None
     yield Progress(0.0, f"CAUTION: {text}")
-    return sampled, {"text": text, **asdict(seen)}
+    return sampled, Caution(text, seen.ratio, seen.worst, seen.share, seen.dark)
 
 
 def _of_patches(on: Stage, hemicube: Hemicube, own: np.ndarray, sampled: bool) -> Steps:

@@ -5,14 +5,11 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 
+from ...core.capture.kinds import Route
 from ...core.errors import SceneError
 from ...core.hemicube import Hemicube
 from ...core.region import Region
 from .planes import MOST_SAMPLED
-
-# The route of a scene whose light comes in by shadow rays (`light_check`): not one to be chosen.
-SAMPLED = "sampled"
-
 
 # Where tiles are not too thin they begin at a row of the picture that is one of all proxies.
 ALIGNED = 8
@@ -47,17 +44,17 @@ def strips_of(region: Region, count: int) -> list[Region]:
 
 
 def render_plan(
-    route: str, hemicube: Hemicube, names: Sequence[str]
+    route: Route, hemicube: Hemicube, names: Sequence[str]
 ) -> list[list[tuple[int, str]]]:
     """The (patch, pattern name) images of each render."""
     k = range(len(hemicube))
-    if route == SAMPLED:
+    if route == Route.SAMPLED:
         # every pattern in renders of its own, whose paths are the same: the seed is, and the lights
         # are where they were
         some = [k[i : i + MOST_SAMPLED] for i in range(0, len(k), MOST_SAMPLED)]
         return [[(i, name) for i in part] for name in names for part in some]
-    if route == "all":
+    if route == Route.ALL:
         return [[(i, name) for i in k for name in names]]
-    if route == "pattern":
+    if route == Route.PATTERN:
         return [[(i, name) for i in k] for name in names]
     return [[(i, name)] for i in k for name in names]

@@ -5,10 +5,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import bpy
 
+from ...core.capture.agreement import Caution
+from ...core.capture.kinds import Keep, Route
 from ...core.capture.names import GRAIN
 from ...core.capture.refine import check as can_refine
 from ...core.errors import ArtoError
@@ -22,7 +23,7 @@ from ..stage.stage import Stage, picture_region
 from ..work import Progress, Steps
 from . import planes, room
 from .light_check import check_light
-from .plan import SAMPLED, render_plan, strips_of, tiles_of
+from .plan import render_plan, strips_of, tiles_of
 from .probe import refined
 from .room import Estimate
 
@@ -36,8 +37,8 @@ class Given:
     to them; caution: see `check_light`."""
 
     hemicube: Hemicube
-    route: str
-    caution: dict[str, Any] | None
+    route: Route
+    caution: Caution | None
 
 
 @dataclass(frozen=True)
@@ -45,10 +46,10 @@ class Planned:
     """What a capture will be, before its first long render."""
 
     hemicube: Hemicube
-    route: str
+    route: Route
     grain: bool
     kept: bool
-    caution: dict[str, Any] | None
+    caution: Caution | None
     tiles: list[Region]
     estimate: Estimate
 
@@ -74,9 +75,9 @@ def planned(
         if settings.adaptive:
             can_refine(hemicube)  # before anything is rendered
         route, caution = yield from light_route(on, hemicube)
-        if settings.adaptive and route != SAMPLED:
+        if settings.adaptive and route != Route.SAMPLED:
             hemicube = yield from refined(on, hemicube, ADAPTIVE_SHARE * len(hemicube))
-    grain = grain and route == "all"
+    grain = grain and route == Route.ALL
     names = [*pattern_set(settings.patterns).patterns, *([GRAIN] if grain else [])]
     plan = [len(images) for images in render_plan(route, hemicube, names)]
     budget = room.budget(settings.memory)
@@ -93,9 +94,9 @@ def planned(
         one = room.estimate(plan, tiles, len(hemicube), not kept, seconds)
         return tiles, one.times(takes)
 
-    kept = settings.keep != "never"
+    kept = settings.keep != Keep.NEVER
     tiles, estimate = estimated(kept)
-    if settings.keep == "fits" and estimate.kept > settings.keep_limit * 1e9:
+    if settings.keep == Keep.FITS and estimate.kept > settings.keep_limit * 1e9:
         kept = False
         check_choice(settings.support, pattern_set(settings.patterns), settings.separate)
         tiles, estimate = estimated(kept)
@@ -110,9 +111,9 @@ def light_route(on: Stage, hemicube: Hemicube) -> Steps:
     settings = on.scene.arto
     if not settings.far:
         # a near hemicube is no world: what it lights differs by what it is near to
-        return settings.route, None
+        return Route(settings.route), None
     sampled, caution = yield from check_light(on, hemicube)
-    return (SAMPLED if sampled else settings.route), caution
+    return (Route.SAMPLED if sampled else Route(settings.route)), caution
 
 
 def most(scene: bpy.types.Scene) -> Estimate:
@@ -122,7 +123,7 @@ def most(scene: bpy.types.Scene) -> Estimate:
     hemicube = planes.wanted(scene, (0.0, 0.0, 0.0), 1.0)
     patches = len(hemicube) * (ADAPTIVE_SHARE if settings.adaptive else 1)
     images = patches * (len(pattern_set(settings.patterns)) + settings.grain)
-    fitted = settings.keep == "never"
+    fitted = settings.keep == Keep.NEVER
     bytes_a_pixel = room.bytes_a_pixel(images, patches, fitted)
     tiles = tiles_of(picture_region(scene), bytes_a_pixel, room.budget(settings.memory))
     return room.estimate([images], tiles, patches, fitted)

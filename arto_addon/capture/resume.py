@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from ...core import marked
-from ...core.capture.capture_set import HEADER, CaptureSet, write_header
+from ...core.capture import head as heads
+from ...core.capture.capture_set import CaptureSet
+from ...core.capture.head import HEADER, CaptureHead
 from ...core.errors import ArtoError, CaptureSetError, FieldError
 from ...core.field.field import Field
 from ...core.field.writer import describe, write_head
@@ -17,12 +19,12 @@ from ...core.fit.fit import about_of
 from .stream import Stream
 
 
-def unfinished(folder: Path, key: str) -> dict[str, Any] | None:
-    """The description of the very same capture, left unfinished, to go on with."""
+def unfinished(folder: Path, key: str) -> CaptureHead | None:
+    """The head of the very same capture, left unfinished, to go on with."""
     if (folder / HEADER).is_file():
         with contextlib.suppress(ArtoError):
             there = CaptureSet(folder, unfinished=True).head
-            if there.get("key") == key:
+            if there.key == key:
                 # what a process that was killed was writing
                 for partial in folder.glob("*" + PART):
                     marked.remove_file(partial, "capture")
@@ -69,31 +71,36 @@ def finish(unfinished: Path, folder: Path) -> None:
         ) from e
 
 
-def let_go(folder: Path, head: dict[str, Any], number: int, fitted: dict[str, Any]) -> None:
-    """Note down that a tile was fitted, then remove its basis images."""
-    entry = head["tiles"][number]
-    files, entry["files"] = entry["files"], []
-    entry.pop("seeds", None)
-    entry["fitted"] = fitted
-    write_header(folder, head)
+def let_go(folder: Path, head: CaptureHead, number: int, fitted: dict[str, Any]) -> CaptureHead:
+    """Note down that a tile was fitted, then remove its basis images -> the head after it."""
+    files = head.tiles[number].files
+    head = head.with_tile(number, files=(), seeds=(), fitted=fitted)
+    heads.write(folder, head)
     for name in files:
         marked.remove_file(folder / name, "capture")
+    return head
 
 
-def finish_field(unfinished: Path, folder: Path, head: dict[str, Any]) -> None:
+def finish_field(unfinished: Path, folder: Path, head: CaptureHead) -> None:
     """Put the field of a capture that was fitted as it came where the last one is."""
     partial = unfinished / Stream.FIELD
     if not partial.exists():
         # a process that was killed has put it there already
-        if Field(folder).about.get("key") == head["key"]:
+        if Field(folder).about.get("key") == head.key:
             return
         raise FieldError(
             f"the fitted tiles of {unfinished} are gone: discard it, and capture again"
         )
     captured = CaptureSet(unfinished)
-    about = about_of(captured, head["choice"], head["separate"])
+    fitted = [tile.fitted for tile in head.tiles]
+    if None in fitted:
+        raise FieldError(
+            f"{fitted.count(None)} of {len(fitted)} tiles of {unfinished} are not fitted: run "
+            "Capture again, it goes on from there"
+        )
+    about = about_of(captured, *head.told_choice)
     described = describe(captured.hemicube, captured.shape, **about)
-    described["tiles"] = [entry["fitted"] for entry in head["tiles"]]
+    described["tiles"] = fitted
     write_head(partial, described)
     try:
         replace_folder(partial, folder)

@@ -14,6 +14,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ...core.capture.kinds import Route
 from ...core.capture.refine import check as can_refine
 from ...core.capture.refine import refine
 from ...core.errors import SceneError
@@ -26,7 +27,6 @@ from ..work import Progress, Steps, part_of
 from . import planes, probe
 from .capture import capture
 from .check import check_scene
-from .plan import SAMPLED
 from .planned import ADAPTIVE_SHARE, Given, light_route
 
 
@@ -75,18 +75,18 @@ def together(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> 
     hemicube = planes.wanted(scene, *Rendered(low, high).bounds())
     if settings.adaptive:
         can_refine(hemicube)
-    route, caution, probes = settings.route, None, []
+    route, caution, probes = Route(settings.route), None, []
     for frame in some:
         scene.frame_set(frame)
         with stage(scene, view_layer) as on, take(rendered(on), WHOLE):
             prepare(on, layers=len(pattern_set(settings.patterns)) + settings.grain)
             here, told = yield from light_route(on, hemicube)
-            route = SAMPLED if here == SAMPLED else route
+            route = Route.SAMPLED if here == Route.SAMPLED else route
             caution = caution or told
-            if settings.adaptive and route != SAMPLED:
+            if settings.adaptive and route != Route.SAMPLED:
                 found = yield from probe.probed(on, hemicube)
                 probes.append(found.reshape(len(found), 1, -1, 3))
-    if probes and route != SAMPLED:
+    if probes and route != Route.SAMPLED:
         every = np.concatenate(probes, axis=2)
         most = ADAPTIVE_SHARE * len(hemicube)
         hemicube = refine(hemicube, every, probe.SAMPLES, most)

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import bpy
 
 from ...core import marked
-from ...core.capture.capture_set import CaptureSet, write_header
+from ...core.capture import head as heads
+from ...core.capture.capture_set import CaptureSet
+from ...core.capture.head import CaptureHead
+from ...core.capture.kinds import Take
+from ...core.capture.tile_entry import SeedEntry, fitted_name
 from ...core.errors import ArtoError, FarmError
 from ...core.field.field import proxy_folder
 from ...core.field.proxy import FACTORS
@@ -23,7 +29,8 @@ from ..shot import paths, scene_id
 from ..shot.shot import shot_of
 from ..stage.takes import TAKES
 from ..work import Progress, Steps, retold
-from .job import Job, Part
+from .head import Part
+from .job import Job
 
 
 def gather(job_folder: Path) -> Steps:
@@ -36,7 +43,7 @@ def gather(job_folder: Path) -> Steps:
     job = Job(job_folder)
     sets = {
         (frame, take): job.set_of(frame, take)
-        for frame in job.frames
+        for frame in job.head.frames
         for take in job.takes(frame)
         if not _gathered(job, frame, take)
     }
@@ -52,8 +59,8 @@ def gather(job_folder: Path) -> Steps:
         )
     folders = []
     with job.scene() as (scene, view_layer):
-        for i, frame in enumerate(job.frames):
-            yield Progress(i / len(job.frames), f"gathering frame {frame}")
+        for i, frame in enumerate(job.head.frames):
+            yield Progress(i / len(job.head.frames), f"gathering frame {frame}")
             job.go_to(scene, frame)
             claimed = paths.claim(scene, view_layer)
             left = [take for take in job.takes(frame) if (frame, take) in sets]
@@ -79,18 +86,36 @@ def gather(job_folder: Path) -> Steps:
     return folders
 
 
-def _gathered(job: Job, frame: int, take: str) -> bool:
+def _gathered(job: Job, frame: int, take: Take) -> bool:
     """Whether the capture set of a take of a frame has gone to its shot."""
     return not job.set_folder(frame, take).is_dir()
 
 
-def _found(job: Job, part: Part, captured: CaptureSet) -> dict[str, Any] | None:
-    """What there is of a part: what it says of itself, or the files that a Blender without ARTO has
-    rendered. None where not all of it is there."""
-    if captured.head["tiles"][part.tile]["done"]:
-        return {"taken": True}
-    if told := job.there(part, captured.head["key"]):
-        return told
+@dataclass(frozen=True)
+class Found:
+    """What there is of a part.
+
+    Parameters
+    ----------
+    folder : that its files are in; None where its capture set has them already.
+    files : the names of its EXR files.
+    samples : of each pixel.
+    fitted : where it was fitted and its images went, its entry in `field.json`.
+    """
+
+    folder: Path | None
+    files: tuple[str, ...] = ()
+    samples: int = 0
+    fitted: Mapping[str, Any] | None = None
+
+
+def _found(job: Job, part: Part, captured: CaptureSet) -> Found | None:
+    """What a part says of itself, or the files that a Blender without ARTO has rendered. None where
+    not all of it is there."""
+    if captured.head.tiles[part.tile].done:
+        return Found(None)
+    if told := job.there(part, captured.head.key):
+        return Found(job.part_folder(part), told.files, told.samples, told.fitted)
     files = []
     for i, images in enumerate(plan_of(captured.head)):
         rendered = sorted((job.folder / "parts").glob(f"{part.name}_{i:02d}_*.exr"))
@@ -101,53 +126,56 @@ def _found(job: Job, part: Part, captured: CaptureSet) -> dict[str, Any] | None:
         except ArtoError as e:
             raise FarmError(f"{e}: render part {part.number} again") from e
         files.append(rendered[-1].name)
-    return {"files": files, "samples": job.samples_of(captured.head), "loose": True}
+    return Found(job.folder / "parts", tuple(files), job.samples_of(captured.head))
 
 
-def _joined(job: Job, frame: int, take: str, parts: dict[Part, dict[str, Any]]) -> Steps:
+def _joined(job: Job, frame: int, take: Take, parts: dict[Part, Found]) -> Steps:
     """Take the parts of a take of a frame into its capture set, tile by tile, and fit what is not
     yet."""
     folder = job.set_folder(frame, take)
     head = job.set_of(frame, take).head
-    samples = job.seeds * job.samples_of(head)
+    samples = job.head.seeds * job.samples_of(head)
     title = f"frame {frame}, {take}" if take else f"frame {frame}"
-    for tile in range(job.tiles):
-        entry = head["tiles"][tile]
+    for tile in range(job.head.tiles):
         some = [(p, t) for p, t in parts.items() if p.tile == tile]
-        yield Progress(tile / job.tiles, f"{title}: tile {tile + 1} of {job.tiles}")
-        if not entry["done"]:
-            _take(job, folder, entry, some)
-            head["samples"] = samples
-            write_header(folder, head)
-        if not head["kept"] and "fitted" not in entry:
+        yield Progress(tile / job.head.tiles, f"{title}: tile {tile + 1} of {job.head.tiles}")
+        if not head.tiles[tile].done:
+            head = replace(_taken(folder, head, tile, some), samples=samples)
+            heads.write(folder, head)
+        if not head.kept and head.tiles[tile].fitted is None:
             captured = CaptureSet(folder, unfinished=True)
-            let_go(folder, head, tile, (yield from _fit(captured, tile, job.tiles)))
+            fitted = yield from _fit(captured, tile, job.head.tiles)
+            head = let_go(folder, head, tile, fitted)
     for part in parts:
         marked.remove_quietly(job.part_folder(part), "part", job.folder)
 
 
-def _take(
-    job: Job, folder: Path, entry: dict[str, Any], some: list[tuple[Part, dict[str, Any]]]
-) -> None:
-    """Move what a tile's parts have into its capture set; its description is not written yet."""
-    seeds = []
+def _taken(
+    folder: Path, head: CaptureHead, tile: int, some: list[tuple[Part, Found]]
+) -> CaptureHead:
+    """Move what a tile's parts have into its capture set -> the head of the set, which is not
+    written yet."""
+    seeds, fitted = [], None
     for part, told in some:
-        source = job.folder / "parts" if told.get("loose") else job.part_folder(part)
         names = []
-        for i, name in enumerate(told["files"]):
+        if told.folder is None:
+            raise FarmError(f"{part.name} was gathered, but {folder} does not say so: plan again")
+        for i, name in enumerate(told.files):
             names.append(f"tile_{part.tile:04d}_seed_{part.seed:02d}_{i:04d}.exr")
-            if (source / name).exists():  # else it was moved before a gathering was stopped
-                (source / name).replace(folder / names[-1])
-        seeds.append([told["samples"], names])
-        if fitted := told.get("fitted"):
-            entry["fitted"] = fitted
-            # a part that was fitted by the version before has a folder for a tile
-            name = fitted.get("file") or fitted["folder"]
-            _take_field(source / Stream.FIELD, folder / Stream.FIELD, name)
-    entry["files"] = [name for _, names in seeds for name in names]
-    if len(seeds) > 1:
-        entry["seeds"] = seeds
-    entry["done"] = True
+            if (told.folder / name).exists():  # else it was moved before a gathering was stopped
+                (told.folder / name).replace(folder / names[-1])
+        seeds.append(SeedEntry(told.samples, tuple(names)))
+        if told.fitted:
+            fitted = told.fitted
+            name = fitted_name(fitted)
+            _take_field(told.folder / Stream.FIELD, folder / Stream.FIELD, name)
+    return head.with_tile(
+        tile,
+        files=tuple(name for seed in seeds for name in seed.files),
+        seeds=tuple(seeds) if len(seeds) > 1 else (),
+        fitted=fitted or head.tiles[tile].fitted,
+        done=True,
+    )
 
 
 def _take_field(source: Path, field: Path, name: str) -> None:
@@ -187,9 +215,10 @@ def _placed(scene: bpy.types.Scene, folder: Path, place: Path) -> Steps:
         raise FarmError(f"{place} cannot be written ({e}): make room, and gather again") from e
     head = CaptureSet(near).head
     # planned from a file that no capture has given an ID, it has none, and no name lasts
-    head["shot"]["scene_id"] = scene_id.of(scene)
-    write_header(near, head)
-    if not head["kept"]:
+    if head.shot:
+        head = replace(head, shot=replace(head.shot, scene_id=scene_id.of(scene)))
+    heads.write(near, head)
+    if not head.kept:
         finish_field(near, place / "field", head)
         yield from cleaned(scene, place / "field")
     finish(near, place / "capture")

@@ -3,21 +3,20 @@ the only seed and no images are kept, fitted."""
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import bpy
 
 from ...core import marked
 from ...core.capture.capture_set import CaptureSet
+from ...core.capture.head import CaptureHead
 from ...core.errors import FarmError
-from ...core.files import replace_folder, write_text
+from ...core.files import replace_folder
 from ...core.fit.fit import fit_into
-from ...core.shot import Shot
 from ..blender.output import write_to
 from ..capture import room
 from ..capture.asked import Asked, asked
@@ -26,7 +25,8 @@ from ..capture.check import check_scene
 from ..capture.planned import Given
 from ..capture.stream import Stream
 from ..work import Progress, Steps, retold
-from .job import PART_HEADER, Job, Part, estimate
+from .head import Part, PartHead, write_part
+from .job import Job, estimate
 
 
 def render_part(job_folder: Path, number: int) -> Steps:
@@ -39,10 +39,10 @@ def render_part(job_folder: Path, number: int) -> Steps:
     part = job.part(number)
     captured = job.set_of(part.frame, part.take)
     folder = job.part_folder(part)
-    if job.there(part, captured.head["key"]):
+    if job.there(part, captured.head.key):
         yield Progress(1.0, f"{part.name} is there")
         return folder
-    fitted = job.seeds == 1 and not captured.kept
+    fitted = job.head.seeds == 1 and not captured.kept
     room.check_memory(estimate(captured.head, fitted).memory, part.name)
     begun = time.perf_counter()
     partial: Path | None = None
@@ -51,15 +51,21 @@ def render_part(job_folder: Path, number: int) -> Steps:
         partial = marked.scratch(folder, "part")
         with _on_stage(job, part, captured) as this:
             files = yield from render_tile(this.on, captured.head, part.tile, partial)
-        told: dict[str, Any] = {"part": part.to_json(), "key": captured.head["key"]}
-        told["samples"] = job.samples_of(captured.head)
+        entry = None
         if fitted:
-            told["fitted"] = yield from _fitted(captured, part, partial, files)
+            entry = yield from _fitted(captured, part, partial, files)
             for name in files:
                 marked.remove_file(partial / name, "part")
             files = []
-        told |= {"files": files, "seconds": round(time.perf_counter() - begun, 3)}
-        write_text(partial / PART_HEADER, json.dumps(told, indent=1))
+        told = PartHead(
+            part=part,
+            key=captured.head.key or "",
+            samples=job.samples_of(captured.head),
+            files=tuple(files),
+            seconds=round(time.perf_counter() - begun, 3),
+            fitted=entry,
+        )
+        write_part(partial, told)
         replace_folder(partial, folder)
     except OSError as e:
         raise FarmError(f"{folder} cannot be written ({e}): make room, or see who may write") from e
@@ -78,7 +84,7 @@ def save_part(job_folder: Path, number: int) -> Steps:
     job = Job(job_folder)
     part = job.part(number)
     captured = job.set_of(part.frame, part.take)
-    if job.subframe:
+    if job.head.subframe:
         raise FarmError(
             f"{part.name} is of a moment between two frames, and what renders a file renders whole "
             "ones: render that part with ARTO, or plan it at a whole frame"
@@ -114,19 +120,19 @@ def _save_alone(scene: bpy.types.Scene, path: Path) -> None:
 def _on_stage(job: Job, part: Part, captured: CaptureSet) -> Iterator[Asked]:
     """The stage of a part, with its seed. Raises FarmError unless the scene is what was planned."""
     head = captured.head
-    given = Given(captured.hemicube, head["route"], None)
+    given = Given(head.hemicube, head.told_route, None)
     samples = job.samples_of(head)
     with job.scene() as (scene, view_layer):
         job.go_to(scene, part.frame)
         check_scene(scene, view_layer)
         with asked(scene, view_layer, given, part.take) as this:
-            changed = _differences(this, head | {"samples": samples})
+            changed = _differences(this, replace(head, samples=samples))
             if changed:
                 raise FarmError(
                     f"this is not the scene that was planned ({'; '.join(changed[:3])}): give "
                     "every machine the same file and the same Blender, or plan again"
                 )
-            if job.seeds > 1:
+            if job.head.seeds > 1:
                 # a stretch of the one sequence that as many samples together have, which is better
                 # than as many seeds: its samples lie between those of the other stretches. All
                 # takes have the same: noise that they share goes where they are divided
@@ -134,32 +140,41 @@ def _on_stage(job: Job, part: Part, captured: CaptureSet) -> Iterator[Asked]:
                 cycles.use_sample_subset = True
                 cycles.sample_subset_length = samples
                 cycles.sample_offset = part.seed * samples
-                cycles.samples = job.seeds * samples
+                cycles.samples = job.head.seeds * samples
             yield this
 
 
-def _differences(this: Asked, head: dict[str, Any]) -> list[str]:
+def _differences(this: Asked, head: CaptureHead) -> list[str]:
     """What of a scene is not as it was planned, in words."""
-    out = []
-    for name in ("samples", "seed", "adaptive", "far", "blender", "colour_space", "catchers"):
-        here = this.decides.get(name)
-        if here != head.get(name):
-            out.append(f"{name.replace('_', ' ')}: {here}, not {head.get(name)}")
-    planned = head["fingerprint"]
+    if head.shot is None:
+        return ["it has no shot"]
+    here = this.head
+    out = [
+        f"{name}: {now}, not {then}"
+        for name, now, then in (
+            ("samples", here.samples, head.samples),
+            ("seed", here.seed, head.seed),
+            ("adaptive", here.adaptive, head.adaptive),
+            ("far", here.far, head.far),
+            ("blender", here.blender, head.blender),
+            ("colour space", here.colour_space, head.colour_space),
+            ("catchers", here.catchers, head.catchers),
+        )
+        if now != then
+    ]
+    planned = head.fingerprint or {}
     for thing in sorted(planned.keys() | this.found.keys()):
         if planned.get(thing) != this.found.get(thing):
             out.append(f"{thing} is another")
-    there = Shot.from_json(head["shot"])
     for name in ("camera_matrix", "lens", "frame", "subframe", "width", "height"):
-        if getattr(this.shot, name) != getattr(there, name):
+        if getattr(this.shot, name) != getattr(head.shot, name):
             out.append(f"the shot's {name.replace('_', ' ')} is another")
     return out
 
 
 def _fitted(captured: CaptureSet, part: Part, folder: Path, files: list[str]) -> Steps:
     """Fit a part's tile into its folder -> its entry in `field.json`."""
-    rendered = CaptureSet(captured.folder, unfinished=True)
-    rendered.folder = folder
-    rendered.files[part.tile] = files
+    head = captured.head.with_tile(part.tile, files=tuple(files))
+    rendered = CaptureSet(folder, unfinished=True, head=head)
     steps = fit_into(rendered, part.tile, folder / Stream.FIELD)
     return retold(steps, lambda share: Progress(0.5 + share / 2, f"fitting {part.name}"))

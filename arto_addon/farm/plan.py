@@ -7,13 +7,14 @@ import os
 import re
 import shutil
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import bpy
 
 from ...core import marked
-from ...core.capture.capture_set import CaptureSet, write_header
+from ...core.capture import head as capture_heads
+from ...core.capture.head import CaptureHead
 from ...core.errors import CaptureSetError, FarmError
 from ...core.fit.choice import check as check_choice
 from ...core.patterns import pattern_set
@@ -25,9 +26,10 @@ from ..capture.check import check_scene
 from ..capture.planned import Given
 from ..capture.sequence import frame_kept, together
 from ..shot import home
-from ..stage.takes import PAIR, TAKES, WHOLE
+from ..stage.takes import TAKES, WHOLE
 from ..work import Progress, Steps
 from . import job, templates
+from .head import HEADER, is_job
 
 
 def plan(
@@ -74,18 +76,18 @@ def plan(
             scene.view_layers[view_layer].update()
             heads = yield from _heads(scene, view_layer, folder, given, tiles, seeds)
             # every frame is cut as the first one is
-            tiles = len(heads[WHOLE]["tiles"])
-            caution = caution or heads[WHOLE]["caution"]
+            tiles = len(heads[WHOLE].tiles)
+            caution = caution or heads[WHOLE].caution
             if len(heads) > 1:
                 catchers.append(frame)
             for take, head in heads.items():
-                write_header(job.set_folder(folder, frame, take), head)
+                capture_heads.write(job.set_folder(folder, frame, take), head)
                 needed += _disk(head, seeds)
     _check_disk(folder, needed)
     made = job.write(folder, scene, view_layer, frames, subframe, catchers, tiles or 1, seeds)
     templates.write(made)
     takes = f", {1 + len(TAKES)} takes of {len(catchers)} with shadow catchers" if catchers else ""
-    told = f". CAUTION: {caution['text']}" if caution else ""
+    told = f". CAUTION: {caution.text}" if caution else ""
     yield Progress(
         1.0,
         f"planned {len(made.parts)} parts: {len(frames)} frames{takes}, {tiles} tiles, {seeds} "
@@ -97,12 +99,12 @@ def plan(
 def _make_way(folder: Path, frames: list[int]) -> None:
     """Remove the job that was planned into a folder before, of which nothing is rendered. Raises
     FarmError where something else is in the way; then nothing has been touched."""
-    header = folder / job.HEADER
+    header = folder / HEADER
     if os.path.lexists(header):
         try:
             job.Job(folder)
         except FarmError as e:
-            if not job.is_job(header):
+            if not is_job(header):
                 raise FarmError(f"{header} is no job of ARTO's: plan into another folder") from e
     templates.check(folder)
     sets = [there for there in _frames_in(folder) if _is_planned(there)]
@@ -114,7 +116,7 @@ def _make_way(folder: Path, frames: list[int]) -> None:
             )
     # the description first, so that who is killed while planning leaves no job
     if os.path.lexists(header):
-        marked.remove_own_file(header, job.is_job)
+        marked.remove_own_file(header, is_job)
     for there in sets:
         marked.remove(there, "capture", folder)
 
@@ -129,10 +131,9 @@ def _is_planned(folder: Path) -> bool:
     if marked.kind_of(folder) != "capture":
         return False
     try:
-        head = CaptureSet(folder, unfinished=True).head
+        return not capture_heads.read(folder).done
     except CaptureSetError:
         return False
-    return not any(entry["done"] for entry in head["tiles"])
 
 
 def _heads(
@@ -143,34 +144,33 @@ def _heads(
     tiles: int | None,
     seeds: int,
 ) -> Steps:
-    """Plan the takes of a frame -> the description of each one's capture set, by the take's name,
-    that of everything first."""
+    """Plan the takes of a frame -> the head of each one's capture set, by the take's name, that of
+    everything first."""
     with asked(scene, view_layer, given) as this:
         count = 1 + len(TAKES) * this.catchers
         _, first = yield from begun(this, folder, given, tiles, count)
-    first["key"] = _key_of(first, seeds)
+    first = replace(first, key=_key_of(first, seeds))
     heads = {WHOLE: first}
     for name in TAKES if this.catchers else ():
         beside = given_by(first)
         with asked(scene, view_layer, beside, name) as this:
-            _, head = yield from begun(this, folder, beside, len(first["tiles"]))
-        head["key"], head[PAIR] = _key_of(head, seeds), first["key"]
-        heads[name] = head
+            _, head = yield from begun(this, folder, beside, len(first.tiles))
+        heads[name] = replace(head, key=_key_of(head, seeds), pair=first.key)
     return heads
 
 
-def _key_of(head: dict[str, Any], seeds: int) -> str:
+def _key_of(head: CaptureHead, seeds: int) -> str | None:
     """The key of what all seeds make together: it is no capture of the samples of one."""
     if seeds == 1:
-        return head["key"]
-    return hashlib.sha256(f"{head['key']} {seeds}".encode()).hexdigest()[:16]
+        return head.key
+    return hashlib.sha256(f"{head.key} {seeds}".encode()).hexdigest()[:16]
 
 
-def _disk(head: dict[str, Any], seeds: int) -> int:
+def _disk(head: CaptureHead, seeds: int) -> int:
     """Bytes that the parts of a take have in a job's folder until they are gathered: light by light
     where there are seeds to be averaged, or images are kept."""
     light, field = (job.estimate(head, fitted).kept for fitted in (False, True))
-    if head["kept"]:
+    if head.kept:
         return seeds * light
     return field if seeds == 1 else seeds * light + field
 

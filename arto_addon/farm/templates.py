@@ -55,7 +55,7 @@ def openjd(job: Job) -> dict[str, Any]:
 
     return {
         "specificationVersion": "jobtemplate-2023-09",
-        "name": f"ARTO {Path(job.blend).stem}"[:64],
+        "name": f"ARTO {Path(job.head.blend).stem}"[:64],
         "parameterDefinitions": [
             {"name": "Blender", "type": "STRING", "default": "blender"},
             {"name": "Addon", "type": "STRING", "default": ADDON},

@@ -25,13 +25,12 @@ def _is_fitted(captured: CaptureSet, folder: Path, choice: str, separate: bool) 
     except FieldError:
         return False
     then = about.get("key"), about.get("choice"), about.get("separate", False)
-    return then[0] is not None and then == (captured.head.get("key"), choice, separate)
+    return then[0] is not None and then == (captured.head.key, choice, separate)
 
 
 def _fit_one(scene: bpy.types.Scene, captured: CaptureSet, target: Path) -> Steps:
     settings = scene.arto
-    about = {"shot": captured.head.get("shot", {})}
-    work = fit_captured(captured, target, settings.support, settings.separate, **about)
+    work = fit_captured(captured, target, settings.support, settings.separate)
     for share, text in work:
         yield Progress(share, text)
     yield from cleaned(scene, target)
@@ -54,7 +53,7 @@ def fit(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     if not folder.exists():
         check_same_shot(scene, paths.nearest(scene, layer), "the capture set", layer)
     captured = CaptureSet(folder)
-    check_same_shot(scene, captured.head.get("shot"), "the capture set", layer)
+    check_same_shot(scene, captured.head.shot, "the capture set", layer)
     settings = scene.arto
     there = place.source / "field"
     if _is_fitted(captured, there, settings.support, settings.separate):
@@ -63,13 +62,13 @@ def fit(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     if not captured.kept:
         raise CaptureSetError(
             "the basis images of this capture were not kept, so nothing can be fitted to them "
-            f"anew: set Support back to '{captured.head.get('choice')}', or capture again with "
+            f"anew: set Support back to '{captured.head.choice}', or capture again with "
             "Keep Basis Images on Always"
         )
     # a capture set of the version before is read where it is; its field goes where fields are now
     target = (paths.claim(scene, layer) if place.earlier else place.folder) / "field"
     with Lock(target.parent, f"fitting {shot_of(scene, layer).title}"):
-        if captured.head.get("catchers"):
+        if captured.head.catchers:
             # first, so that no field of everything is there without those beside it
             for name in takes.TAKES:
                 there = CaptureSet(folder.parent / name / "capture")

@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.capture.kinds import Route
 from ...core.catcher import held_out
 from ...core.errors import FieldError
 from ...core.field.field import Field
@@ -20,7 +21,6 @@ from ...core.light.lamps import Split, split
 from ...core.light.light import PatchLight
 from ...core.relight import relights
 from ..blender import denoise
-from ..capture.plan import SAMPLED
 from ..fit import guides
 from ..plate.footage import footage
 from ..shot import paths
@@ -74,7 +74,7 @@ class Shown:
         self._changed: dict[tuple[int, float], list[str]] = {}
         self._split: tuple[NDArray[np.float32], Split] | None = None
         self._filmed: tuple[tuple[int, float], tuple[str, NDArray[np.float32]]] | None = None
-        self.held = self.field.about.get("route") == SAMPLED
+        self.held = self.field.about.get("route") == Route.SAMPLED
         self._others: list[Shown] = []
         if self.field.about.get("catchers") and not self.field.about.get("take"):
             self._others = [self._beside(folder.parent / name / "field") for name in takes.TAKES]
@@ -107,7 +107,8 @@ class Shown:
         """What of the scene is not as it was captured, at its frame."""
         frame = self.scene.frame_current, self.scene.frame_subframe
         if frame not in self._changed:
-            found = changed_since(self.scene, self.layer, self.field.about, now=True)
+            then = self.field.about.get("fingerprint")
+            found = changed_since(self.scene, self.layer, then, now=True)
             self._changed = {frame: found}
         return self._changed[frame]
 

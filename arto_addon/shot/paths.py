@@ -21,7 +21,7 @@ from pathlib import Path
 import bpy
 
 from ...core import marked
-from ...core.capture.capture_set import HEADER as CAPTURE_HEADER
+from ...core.capture.head import HEADER as CAPTURE_HEADER
 from ...core.description import Description
 from ...core.errors import ArtoError, SceneError, ShotError
 from ...core.field.field import HEADER as FIELD_HEADER

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import bpy
 
-from ...core.capture import capture_set
 from ...core.capture.capture_set import CaptureSet
+from ...core.capture.head import HEADER
 from ...core.errors import ArtoError
 from ...core.field import field
 from ...core.field.field import Field
@@ -50,15 +51,14 @@ def _place(scene: bpy.types.Scene, view_layer: str | None) -> Place | None:
 def unfinished(folder: Path) -> list[str]:
     """The captures in a shot's folder that were stopped, the newest first: `2 of 7 tiles`."""
     found = []
-    for path in folder.glob("unfinished-*/" + capture_set.HEADER):
+    for path in folder.glob("unfinished-*/" + HEADER):
         try:
             there = _opened(CaptureSet, path, unfinished=True)
         except OSError:
             continue
         if there:
-            tiles = there.head["tiles"]
-            done = sum(bool(t["done"]) for t in tiles)
-            found.append((path.stat().st_mtime_ns, f"{done} of {len(tiles)} tiles"))
+            head = there.head
+            found.append((path.stat().st_mtime_ns, f"{head.done} of {len(head.tiles)} tiles"))
     return [text for _, text in sorted(found, reverse=True)]
 
 
@@ -78,9 +78,9 @@ def capture_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line 
         return f"unfinished, {stopped[0]}", False
     if there is None:
         other = _nearest(scene, view_layer, place)
-        return _of_this_shot(scene, view_layer, {"shot": other}, "") if other else None
-    text = f"{len(there.hemicube)} patches, {there.head.get('samples')} samples"
-    return _of_this_shot(scene, view_layer, there.head, text)
+        return _of_this_shot(scene, view_layer, other, None, "") if other else None
+    text = f"{len(there.hemicube)} patches, {there.head.samples} samples"
+    return _of_this_shot(scene, view_layer, there.head.shot, there.head.fingerprint, text)
 
 
 # By the shot's own folder, for a panel that is drawn often: when it was looked for, and found.
@@ -100,13 +100,13 @@ def caution_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line 
     """What the check of the light found before the capture; None for nothing."""
     place = _place(scene, view_layer)
     there = _capture_set(place) if place and not place.owner else None
-    caution = there.head.get("caution") if isinstance(there, CaptureSet) else None
-    return (str(caution["text"]), False) if isinstance(caution, dict) else None
+    caution = there.head.caution if isinstance(there, CaptureSet) else None
+    return (caution.text, False) if caution else None
 
 
 def _capture_set(place: Place) -> CaptureSet | Line | None:
     try:
-        there = _opened(CaptureSet, place.source / "capture" / capture_set.HEADER, unfinished=True)
+        there = _opened(CaptureSet, place.source / "capture" / HEADER, unfinished=True)
     except OSError:
         return None
     return there or ("damaged, or of another version: capture again", False)
@@ -154,22 +154,28 @@ def field_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line | 
         return "damaged, or of another version: fit again", False
     captured = _capture_set(place)  # which a field does not need any more
     if isinstance(captured, CaptureSet):
-        keys = there.about.get("key"), captured.head.get("key")
+        keys = there.about.get("key"), captured.head.key
         if keys[0] != keys[1]:
             return "of an earlier capture: fit again", False
     text = f"{len(there.hemicube)} patches, {there.about.get('choice')}"
-    return _of_this_shot(scene, view_layer, there.about, text)
+    about = there.about
+    return _of_this_shot(scene, view_layer, about.get("shot"), about.get("fingerprint"), text)
 
 
 def _of_this_shot(
-    scene: bpy.types.Scene, view_layer: str | None, head: dict[str, Any], text: str
+    scene: bpy.types.Scene,
+    view_layer: str | None,
+    shot: Any,
+    then: Mapping[str, str] | None,
+    text: str,
 ) -> Line:
+    """What to say of what a shot and a fingerprint are of: `text`, where they are the scene's."""
     layer = view_layer or layer_of(scene)
     try:
-        check_same_shot(scene, head.get("shot"), "it", layer)
+        check_same_shot(scene, shot, "it", layer)
     except ArtoError as e:
         return str(e).removeprefix("it ").split(":")[0] + ": capture again", False
-    changed = changed_since(scene, layer, head)
+    changed = changed_since(scene, layer, then)
     if changed:
         more = f" (and {len(changed) - 1} more)" if len(changed) > 1 else ""
         return f"{changed[0]}{more}", False
@@ -177,14 +183,17 @@ def _of_this_shot(
 
 
 def changed_since(
-    scene: bpy.types.Scene, view_layer: str, head: dict[str, Any], now: bool = False
+    scene: bpy.types.Scene,
+    view_layer: str,
+    then: Mapping[str, str] | None,
+    now: bool = False,
 ) -> list[str]:
     """What of the scene has changed since a capture, in words, the most telling first.
 
-    now: look now; else, in the window, it is what was found after the last change.
+    then: the capture's fingerprint; now: look now; else, in the window, the answer is that of the
+    last look after a change.
     """
-    then = head.get("fingerprint")
-    if not isinstance(then, dict):
+    if then is None:
         return []
-    found = watch.latest(scene, view_layer, then, now or bpy.app.background)
-    return changes(then, found) if found is not None else []
+    found = watch.latest(scene, view_layer, dict(then), now or bpy.app.background)
+    return changes(dict(then), found) if found is not None else []

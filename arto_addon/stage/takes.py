@@ -15,16 +15,17 @@ from contextlib import contextmanager
 
 import bpy
 
+from ...core.capture.kinds import Take
 from ...core.errors import SceneError
 from .bounds import Name, Rendered
 
 # The names of takes: of everything, which is the only one where nothing catches shadows; of the
 # catchers alone; of the things alone.
-WHOLE, GROUND, THINGS = "", "ground", "things"
+WHOLE, GROUND, THINGS = Take.WHOLE, Take.GROUND, Take.THINGS
 # Those beside the first, in the order of capturing. Their names are those of their folders in the
 # shot's.
 TAKES = (GROUND, THINGS)
-# In the description of such a take: the key of the first.
+# In the description of a field of such a take: the key of the first.
 PAIR = "pair"
 # What rays an object is seen by.
 _RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")

@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 
 from ...core import marked
-from ...core.capture.capture_set import HEADER as CAPTURE_HEADER
+from ...core.capture.head import HEADER as CAPTURE_HEADER
 from ...core.errors import ArtoError, SceneError
 from ...core.field.field import HEADER as FIELD_HEADER
 from ...core.files import Lock

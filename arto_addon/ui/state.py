@@ -9,7 +9,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core.capture import capture_set
+from ...core.capture.head import HEADER
 from ...core.errors import ArtoError
 from ...core.field import field
 from ...core.shot import Shot
@@ -152,17 +152,14 @@ def _seconds(scene: bpy.types.Scene, paths_traced: int, unfinished: bool) -> tup
     except (ArtoError, OSError):
         source = None
     if source is not None:
-        headers = [*source.glob("unfinished-*/" + capture_set.HEADER)] if unfinished else []
-        headers.append(source / "capture" / capture_set.HEADER)
+        headers = [*source.glob("unfinished-*/" + HEADER)] if unfinished else []
+        headers.append(source / "capture" / HEADER)
         for header in headers:
             there = status.capture_at(header)
-            if there is None or not there.head.get("seconds"):
+            head = there.head if there else None
+            if head is None or not head.seconds or not head.traced:
                 continue
-            done = [t for t in there.head["tiles"] if t["done"]]
-            traced = sum(t["region"][2] * t["region"][3] for t in done) * there.head["samples"]
-            if not traced:
-                continue
-            whole = there.head["seconds"] * paths_traced / traced
-            share = 1 - len(done) / len(there.head["tiles"]) if unfinished else 1.0
+            whole = head.seconds * paths_traced / head.traced
+            share = 1 - head.done / len(head.tiles) if unfinished else 1.0
             return OTHERS + whole * (share or 1.0), True
     return OTHERS + paths_traced * _GUESS / (os.cpu_count() or 1), False

@@ -17,9 +17,12 @@ False
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..values import Values
 
 # Pixels a side of the regions that are compared.
 BLOCK = 6
@@ -31,6 +34,8 @@ SURE = 6.0
 SHARE = 0.04
 # A picture with less light than this share of a white world's radiance counts as dark.
 DARK = 2e-3
+# Of two lights, one of which is next to none.
+MOST_RATIO = 1e30
 
 
 @dataclass(frozen=True)
@@ -58,6 +63,60 @@ class Agreement:
     def agrees(self) -> bool:
         """Whether so few regions differ that noise explains them."""
         return self.share <= SHARE
+
+
+@dataclass(frozen=True)
+class Caution:
+    """What the check of the light found before the capture, see `Agreement`.
+
+    Parameters
+    ----------
+    text : what is wrong and why it may be, for an artist.
+    ratio : all light of the patches over that of a white world.
+    worst : that ratio in the regions that differ.
+    share : of the regions that differ, 0 to 1.
+    dark : whether next to no light gets in at all.
+    """
+
+    text: str
+    ratio: float
+    worst: float
+    share: float
+    dark: bool
+
+    @staticmethod
+    def read(said: Values) -> Caution:
+        """Read a part of a head.
+
+        Parameters
+        ----------
+        said : Values
+
+        Returns
+        -------
+        Caution
+
+        Raises
+        ------
+        CaptureSetError
+            A value is missing, or cannot be right.
+        """
+        text, dark = said.some_text("text"), said.kind("dark", bool)
+        ratio = said.real("ratio", -MOST_RATIO, MOST_RATIO)
+        worst = said.real("worst", -MOST_RATIO, MOST_RATIO)
+        share = said.real("share", 0.0, 1.0)
+        if text is None or ratio is None or worst is None or share is None or dark is None:
+            raise said.wrong("text, ratio, worst, share, dark", said.data)
+        return Caution(text, ratio, worst, share, dark)
+
+    def to_json(self) -> dict[str, Any]:
+        """Give what `read` reads.
+
+        Returns
+        -------
+        dict
+        """
+        return dict(vars(self))
 
 
 def agreement(

@@ -156,11 +156,14 @@ def fit_into(
     Raises
     ------
     CaptureSetError
-        A basis image cannot be read.
+        A basis image cannot be read, or the set does not say what to fit it with.
     FieldError
         The folder cannot be written.
+    PatternError
+        The patterns cannot identify what the set is to be fitted with.
     """
-    choice, separate = captured.head["choice"], captured.head["separate"]
+    choice, separate = captured.head.told_choice
+    choices.check(choice, captured.patterns, separate)
     with captured.open(tile) as data:
         for step in fit_tile(
             data, captured.patterns, captured.hemicube, choice, captured.samples, separate
@@ -187,9 +190,24 @@ def about_of(captured: CaptureSet, choice: str, separate: bool, **about: Any) ->
     -------
     dict
     """
-    keep = ("scene", "colour_space", "samples", "file", "frame", "view_layer", "far", "key")
-    keep += ("fingerprint", "route", "shot", "catchers", "take", "pair")
-    known = {key: captured.head[key] for key in keep if key in captured.head}
+    head = captured.head
+    said = {
+        "scene": head.scene,
+        "colour_space": head.colour_space,
+        "samples": head.samples,
+        "file": head.file,
+        "frame": head.frame,
+        "view_layer": head.view_layer,
+        "far": head.far,
+        "key": head.key,
+        "fingerprint": head.fingerprint,
+        "route": head.route,
+        "shot": head.shot.to_json() if head.shot else None,
+        "catchers": None if head.catchers is None else list(head.catchers),
+        "take": head.take,
+        "pair": head.pair,
+    }
+    known = {name: value for name, value in said.items() if value is not None}
     return {"choice": choice, "separate": separate} | known | about
 
 

@@ -235,7 +235,7 @@ def test_quality_is_a_multiple_of_the_scenes_own(tmp_path) -> None:
     assert scene.arto.quality == "CUSTOM" and samples_of(scene) == 7
     scene.arto.quality = "DRAFT"
     scene.cycles.use_adaptive_sampling, scene.cycles.samples = False, 8
-    assert captured(scene).head["samples"] == 2
+    assert captured(scene).head.samples == 2
 
 
 def test_states_before_a_capture(tmp_path) -> None:
@@ -277,8 +277,8 @@ def test_an_unfinished_capture_goes_on(tmp_path) -> None:
     (header,) = paths.place(scene).source.glob("unfinished-*/capture.json")
     head = status.capture_at(header).head
     seconds, known = state._seconds(scene, 320 * 240, unfinished=True)
-    left = len(head["tiles"]) - 1
-    assert known and seconds == pytest.approx(state.OTHERS + left * head["seconds"], rel=0.3)
+    left = len(head.tiles) - 1
+    assert known and seconds == pytest.approx(state.OTHERS + left * head.seconds, rel=0.3)
 
 
 def test_a_built_hemicube_can_be_seen_and_is_the_one_that_captures(tmp_path) -> None:

@@ -81,9 +81,9 @@ def test_guides_and_description(tmp_path):
     assert set(data.guides) == {"albedo", "normal", "depth", "position"}
     assert data.guides["albedo"].shape == (HEIGHT, WIDTH, 3)
     assert data.alpha.max() == 1
-    assert there.head["changed"]["cycles.sample_clamp_indirect"] == [10.0, 0.0]
-    assert there.head["colour_space"] == "Linear Rec.709"
-    assert there.head["blender"] == bpy.app.version_string
+    assert there.head.changed["cycles.sample_clamp_indirect"] == [10.0, 0.0]
+    assert there.head.colour_space == "Linear Rec.709"
+    assert there.head.blender == bpy.app.version_string
 
 
 def test_tiles_make_the_same_picture(tmp_path):
@@ -190,13 +190,13 @@ def test_another_capture_does_not_go_on_with_it(tmp_path, monkeypatch):
     scene.arto.samples -= 1
     there = captured(scene)
     assert (there.folder / "tile_0000.exr").stat().st_mtime_ns == old
-    assert there.head["samples"] == 64 and not unfinished(scene)
+    assert there.head.samples == 64 and not unfinished(scene)
     # and what a crash left behind is in nobody's way
     left = there.folder.with_name("capture.old")
     left.mkdir()
     (left / "tile_0000.exr").write_text("half of it")
     scene.arto.samples += 1
-    assert captured(scene).head["samples"] == scene.arto.samples
+    assert captured(scene).head.samples == scene.arto.samples
     assert not left.exists()
 
 
@@ -211,7 +211,7 @@ def test_cancelled_capture_keeps_the_finished_one(tmp_path):
     assert {p.name: p.read_bytes() for p in there.folder.iterdir()} == before
     work.run(fit.fit(scene))
     # the new one takes its place, and nothing is left beside it
-    assert captured(scene).head["samples"] == scene.arto.samples
+    assert captured(scene).head.samples == scene.arto.samples
     assert sorted(p.name for p in there.folder.parent.iterdir()) == [
         "capture",
         "field",

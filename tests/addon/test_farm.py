@@ -14,6 +14,7 @@ import pytest
 from arto.arto_addon import work
 from arto.arto_addon.capture import planned
 from arto.arto_addon.capture.sequence import capture_frames
+from arto.arto_addon.farm import head as job_heads
 from arto.arto_addon.farm import job as jobs
 from arto.arto_addon.farm import part as parts
 from arto.arto_addon.farm import templates
@@ -21,6 +22,7 @@ from arto.arto_addon.farm.gather import gather
 from arto.arto_addon.fit import fit
 from arto.arto_addon.shot import paths
 from arto.core.capture.capture_set import CaptureSet
+from arto.core.capture.kinds import Take
 from arto.core.errors import ArtoError, FarmError
 from arto.core.field.field import Field
 from arto.core.light.environment import Environment
@@ -111,9 +113,8 @@ def test_kept_images_of_seeds_are_a_capture_set(farm_scene, tmp_path):
     each = []
     for p in job.parts:
         folder = work.run(parts.render_part(job.folder, p.number))
-        alone = CaptureSet(job.set_folder(1, ""), unfinished=True)
-        alone.folder, alone.files[0] = folder, ["tile_0000.exr"]
-        each.append(alone.read(0))
+        head = job.set_of(1, Take.WHOLE).head.with_tile(0, files=("tile_0000.exr",))
+        each.append(CaptureSet(folder, unfinished=True, head=head).read(0))
     work.run(gather(job.folder))
     there = CaptureSet(paths.capture_folder(farm_scene))
     found = there.read(0)
@@ -189,12 +190,12 @@ DAMAGE = [
 
 def test_a_damaged_job_is_refused(farm_scene, tmp_path):
     job = planned_job(farm_scene, tmp_path / "job")
-    data = json.loads((job.folder / jobs.HEADER).read_text())
+    data = json.loads((job.folder / job_heads.HEADER).read_text())
     for key, value in DAMAGE:
-        (job.folder / jobs.HEADER).write_text(json.dumps(data | {key: value}))
+        (job.folder / job_heads.HEADER).write_text(json.dumps(data | {key: value}))
         with pytest.raises(ArtoError, match=rf"'{key}' cannot be .*plan again"):
             jobs.Job(job.folder)
-    (job.folder / jobs.HEADER).write_text(json.dumps(data))
+    (job.folder / job_heads.HEADER).write_text(json.dumps(data))
     assert len(jobs.Job(job.folder).parts) == 2
 
 

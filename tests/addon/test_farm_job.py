@@ -11,7 +11,7 @@ from arto.arto_addon import work
 from arto.arto_addon.capture import room
 from arto.arto_addon.capture.capture import capture
 from arto.arto_addon.capture.sequence import capture_frames
-from arto.arto_addon.farm import job as jobs
+from arto.arto_addon.farm import head as job_heads
 from arto.arto_addon.farm import part as parts
 from arto.arto_addon.farm.gather import gather
 from arto.arto_addon.relight.relight import relight
@@ -46,7 +46,7 @@ def test_between_two_frames_is_where_it_was_planned(farm_scene, tmp_path):
     assert (farm_scene.frame_current, farm_scene.frame_subframe) == (7, 0.0)
     farm_scene.frame_set(1, subframe=0.5)
     job = planned_job(farm_scene, tmp_path / "other", frames=[1], tiles=1)
-    assert job.set_of(1, "").head["shot"]["subframe"] == 0.0
+    assert job.set_of(1, "").head.shot.subframe == 0.0
     assert farm_scene.frame_subframe == 0.5
 
 
@@ -60,7 +60,7 @@ def test_the_quality_is_that_of_the_scene(farm_scene, tmp_path, seeds):
     job = planned_job(farm_scene, tmp_path / "job", seeds=seeds)
     for p in job.parts:
         folder = work.run(parts.render_part(job.folder, p.number))
-        told = json.loads((folder / jobs.PART_HEADER).read_text())
+        told = json.loads((folder / job_heads.PART_HEADER).read_text())
         assert told["samples"] == 6
         if seeds == 2 and p.seed == 1:
             # as a Blender without ARTO leaves it
@@ -72,7 +72,7 @@ def test_the_quality_is_that_of_the_scene(farm_scene, tmp_path, seeds):
     steps.close()
     (found,) = work.run(gather(job.folder))
     head = CaptureSet(paths.capture_folder(farm_scene)).head
-    assert Field(found).about["samples"] == head["samples"] == 6 * seeds
+    assert Field(found).about["samples"] == head.samples == 6 * seeds
     assert {name: getattr(farm_scene.arto, name) for name in FARM} == before
 
 
@@ -107,12 +107,12 @@ def test_a_job_of_the_version_before_goes_on(farm_scene, tmp_path):
     farm_scene.arto.adaptive = farm_scene.arto.far = False
     job = planned_job(farm_scene, tmp_path / "job")
     work.run(parts.render_part(job.folder, 0))
-    part = json.loads((job.part_folder(job.parts[0]) / jobs.PART_HEADER).read_text())
+    part = json.loads((job.part_folder(job.parts[0]) / job_heads.PART_HEADER).read_text())
     assert part["part"] == {"number": 0, "frame": 1, "tile": 0, "seed": 0}, "as before"
-    data = json.loads((job.folder / jobs.HEADER).read_text())
+    data = json.loads((job.folder / job_heads.HEADER).read_text())
     del data["catchers"], data["subframe"]
     data["settings"] |= {"overscan": 7, "scene_id": ""}
-    (job.folder / jobs.HEADER).write_text(json.dumps(data | {"version": 1}))
+    (job.folder / job_heads.HEADER).write_text(json.dumps(data | {"version": 1}))
     work.run(parts.render_part(job.folder, 1))
     (found,) = work.run(gather(job.folder))
     assert Field(found).about["samples"] == 16 and farm_scene.arto.overscan == 0
@@ -129,7 +129,7 @@ def test_the_parts_of_all_seeds_must_find_room(farm_scene, tmp_path, monkeypatch
     planned_job(farm_scene, tmp_path / "job")
     with pytest.raises(FarmError, match=r"parts of this job need .* fewer frames or seeds"):
         planned_job(farm_scene, tmp_path / "job", seeds=8)
-    assert not (tmp_path / "job" / jobs.HEADER).exists(), "nothing that half a job hangs on"
+    assert not (tmp_path / "job" / job_heads.HEADER).exists(), "nothing that half a job hangs on"
 
 
 def test_a_machine_without_the_memory_says_so(farm_scene, tmp_path, monkeypatch):

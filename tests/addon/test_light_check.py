@@ -107,7 +107,7 @@ def test_a_room_behind_such_glass_is_relit_as_cycles_renders_it(tmp_path):
     scene.cycles.caustics_refractive = scene.cycles.caustics_reflective = False
     scene.arto.patches, scene.arto.samples, scene.arto.patterns = 4, 256, "linear"
     there = captured(scene)
-    assert there.head["route"] == "sampled" and len(there.files[0]) == 3
+    assert there.head.route == "sampled" and len(there.files[0]) == 3
     # the patterns share their paths: no mean lies off its patch
     basis = there.read(0).basis
     assert (basis[:, 1:].max(axis=1) <= basis[:, 0] * 1.0001 + 1e-7).all()

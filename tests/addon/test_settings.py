@@ -19,7 +19,7 @@ def test_the_page_is_made_of_the_table():
 
 def test_what_was_changed_is_in_the_table(tmp_path):
     scene = small_scene(tmp_path)
-    changed = captured(scene).head["changed"]
+    changed = captured(scene).head.changed
     assert changed.keys() - {"world"} <= {c.setting for c in CHANGES}
     assert changed["cycles.sample_clamp_indirect"] == [10.0, 0.0]
 

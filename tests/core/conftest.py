@@ -13,6 +13,9 @@ import numpy as np
 import pytest
 from arto.core import exr
 from arto.core.capture import capture_set, names
+from arto.core.capture import head as heads
+from arto.core.capture.head import CaptureHead
+from arto.core.capture.tile_entry import TileEntry
 from arto.core.errors import FieldError
 from arto.core.field.field import Field
 from arto.core.field.tile_file import TileFile, written
@@ -170,7 +173,7 @@ def _write_scene(folder: Path, scene: Scene, regions: list[Region] | None = None
         )
         return folder
     height, width = scene.alpha.shape
-    head = capture_set.describe(scene.hemicube, scene.patterns, (height, width))
+    tiles = []
     for n, region in enumerate(regions):
         cut = region.slices
         rgb = scene.basis.sum(axis=(0, 1), dtype=np.float64)[cut] + scene.own[cut]
@@ -180,14 +183,8 @@ def _write_scene(folder: Path, scene: Scene, regions: list[Region] | None = None
                 part = f"Combined_{names.group_name(k, name)}"
                 layers[part] = scene.basis[k, p][cut]
         exr.write(folder / f"tile_{n:04d}.exr", layers)
-        head["tiles"].append(
-            {
-                "region": [region.x, region.y, region.width, region.height],
-                "files": [f"tile_{n:04d}.exr"],
-                "done": True,
-            }
-        )
-    capture_set.write_header(folder, head)
+        tiles.append(TileEntry(region, (f"tile_{n:04d}.exr",), done=True))
+    heads.write(folder, CaptureHead(scene.hemicube, scene.patterns, height, width, tuple(tiles)))
     return folder
 
 

@@ -91,8 +91,8 @@ def test_the_house_is_as_the_architecture_says() -> None:
 # module that stands alone is a room by itself. docs/architecture.md quotes both lists.
 FLOW = {
     "core": """errors < units < regular < before < marked < files < arrays < region < description
-    < shot < metrics < patterns < measure < faces < hemicube < exr < cryptomatte < capture < light
-    < supports < field < fit < lights < relight < catcher < preview < inside < verify""",
+    < values < shot < metrics < patterns < measure < faces < hemicube < exr < cryptomatte < capture
+    < light < supports < field < fit < lights < relight < catcher < preview < inside < verify""",
     "arto_addon": """work < settings < blender < stage < shot < world < plate < fit < capture
     < relight < shoot < job < live < farm < ui""",
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,9 @@ import OpenEXR
 import pytest
 from arto.core import exr
 from arto.core.capture import capture_set, names
-from arto.core.capture.capture_set import HEADER, CaptureSet
+from arto.core.capture import head as heads
+from arto.core.capture.capture_set import CaptureSet
+from arto.core.capture.head import HEADER, VERSION, CaptureHead
 from arto.core.errors import CaptureSetError
 from arto.core.hemicube import Hemicube
 from arto.core.marked import MARK
@@ -20,6 +23,7 @@ from arto.core.region import Region
 
 CUBE = Hemicube(faces=("top", "back"), patches=2, half_sides=True, centre=(1.0, 2.0, 3.0))
 FILE = "tile_0000.exr"
+SMALL = CaptureHead(CUBE, pattern_set("white"), 6, 8)
 
 
 @pytest.fixture
@@ -56,7 +60,7 @@ def test_round_trip(tmp_path: Path, scene, write_scene, patterns: str) -> None:
     assert found.hemicube == CUBE
     assert found.patterns == pattern_set(patterns)
     assert found.shape == (6, 8) and found.pixels == 48
-    assert found.regions == [Region(0, 0, 8, 6)]
+    assert found.regions == (Region(0, 0, 8, 6),)
     tile = found.read(0)
     assert tile.region == Region(0, 0, 8, 6)
     np.testing.assert_array_equal(tile.basis, made.basis)
@@ -76,7 +80,7 @@ def test_without_own_light_nothing_is_left_of_the_sum(tmp_path: Path, scene) -> 
     tile = CaptureSet(tmp_path / "c").read(0)
     np.testing.assert_array_equal(tile.own, 0)
     np.testing.assert_array_equal(tile.alpha, 1)
-    assert CaptureSet(tmp_path / "c").head["samples"] == 64
+    assert CaptureSet(tmp_path / "c").head.samples == 64
 
 
 @pytest.mark.parametrize("shape", [(6, 8), (1, 8), (6, 1), (1, 1)])
@@ -207,8 +211,8 @@ def test_bytes_that_are_no_text(folder: Path) -> None:
 
 
 def test_another_version(folder: Path) -> None:
-    change_header(folder, version=capture_set.VERSION + 1)
-    says = f"version {capture_set.VERSION + 1}; this ARTO reads version {capture_set.VERSION}"
+    change_header(folder, version=VERSION + 1)
+    says = f"version {VERSION + 1}; this ARTO reads version {VERSION}"
     refused(folder, says, "use the ARTO that made it")
 
 
@@ -291,15 +295,15 @@ def test_a_negative_zero_is_no_error(folder: Path) -> None:
 
 def test_a_header_that_cannot_be_written(read_only: Path, tmp_path: Path) -> None:
     with pytest.raises(CaptureSetError, match=r"capture\.json cannot be written .* make room"):
-        capture_set.write_header(read_only / "c", {})
+        heads.write(read_only / "c", SMALL)
     (tmp_path / "file").write_text("mine")
     with pytest.raises(CaptureSetError, match=r"capture\.json cannot be written"):
-        capture_set.write_header(tmp_path / "file", {})
+        heads.write(tmp_path / "file", SMALL)
 
 
 def test_a_header_is_replaced_whole_or_not_at_all(tiny_disk: Path) -> None:
-    capture_set.write_header(tiny_disk, {"version": 1})
+    heads.write(tiny_disk, SMALL)
     with pytest.raises(CaptureSetError, match="make room on the disk"):
-        capture_set.write_header(tiny_disk, {"long": "x" * 300_000})
-    assert json.loads((tiny_disk / HEADER).read_text()) == {"version": 1}
+        heads.write(tiny_disk, replace(SMALL, others={"long": "x" * 300_000}))
+    assert heads.read(tiny_disk) == SMALL
     assert sorted(f.name for f in tiny_disk.iterdir()) == sorted([HEADER, MARK])

@@ -19,8 +19,10 @@ from arto.core.field.field import Field
 from arto.core.fit import fit
 from arto.core.hemicube import Hemicube
 from arto.core.patterns import pattern_set
+from arto.core.shot import Shot
 
 SECONDS, BYTES = 1.0, 200 * 2**20
+SHOT = Shot("Scene", 1, 3, 2, (1.0,) * 16, ("PERSP", 50.0))
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +32,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[type, Path]:
     cube = Hemicube(patches=1)
     basis = np.ones((6, 3, 2, 3, 3), np.float32)
     about = {"samples": 16, "view_layer": "ViewLayer", "fingerprint": {"Mesh 'a'": "1"}}
-    about |= {"shot": {"scene": "Scene"}, "key": "abc", "route": "all", "grain": False}
+    about |= {"shot": SHOT.to_json(), "key": "abc", "route": "all", "grain": False}
     capture_set.write(root / "capture", cube, pattern_set("linear"), basis, **about)
     for _ in fit.fit(CaptureSet(root / "capture"), root / "field"):
         pass
@@ -41,9 +43,9 @@ def looked_at(there: Any) -> None:
     """All that a panel asks of what it opened."""
     if isinstance(there, CaptureSet):
         assert there.pixels >= 0 and len(there.hemicube) > 0
-        assert all(isinstance(t["done"], bool) for t in there.head["tiles"])
+        assert all(isinstance(t.done, bool) for t in there.head.tiles)
         assert all("/" not in name for names in there.files for name in names)
-        found = there.head
+        found = there.head.to_json()
     else:
         there.shares()
         there.bytes_per_pixel()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import dataclasses
 import doctest
+import enum
 import importlib
 import inspect
 import re
@@ -75,7 +76,9 @@ def _parameters(thing: Any) -> set[str]:
         return set(thing.__annotations__)
     if inspect.isclass(thing) and thing.__init__ is object.__init__:
         return set()
-    names = set(inspect.signature(thing).parameters) - {"self"}
+    if inspect.isclass(thing) and issubclass(thing, enum.Enum):
+        return set()
+    names = set(inspect.signature(thing).parameters) - {"self", "cls"}
     return {name for name in names if not name.startswith("_")}
 
 

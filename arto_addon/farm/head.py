@@ -1,0 +1,263 @@
+"""What a farm's files say, checked: `job.json` of a job, and `part.json` of a rendered part.
+
+Each is read by `read` and written by `write` alone.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from ...core.capture.head import LARGEST_FRAME, LONGEST
+from ...core.capture.kinds import Take
+from ...core.capture.tile_entry import MOST_SAMPLES, fitted_name
+from ...core.errors import FarmError
+from ...core.field.writer import tile_names
+from ...core.files import write_text
+from ...core.values import Values
+from ..stage.takes import TAKES
+
+FORMAT = "ARTO farm job"
+# Version 1 knows no takes beside the first, and so has none.
+VERSION = 2
+READABLE = (1, VERSION)
+HEADER = "job.json"
+PART_HEADER = "part.json"
+# Frames, tiles, seeds or parts of a job.
+MOST = 1_000_000
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a job.
+
+    Parameters
+    ----------
+    number : in the job.
+    frame, tile : which tile of the frame's capture set.
+    seed : 0 for the first of the job's seeds, and so on.
+    take : of which take of the frame.
+    """
+
+    number: int
+    frame: int
+    tile: int
+    seed: int
+    take: Take = Take.WHOLE
+
+    @property
+    def name(self) -> str:
+        return f"part_{self.number:04d}"
+
+    @staticmethod
+    def read(said: Values) -> Part:
+        """From a part of a `part.json`. Raises FarmError."""
+        return Part(
+            number=said.whole("number", 0, MOST),
+            frame=said.whole("frame", -LARGEST_FRAME, LARGEST_FRAME),
+            tile=said.whole("tile", 0, MOST),
+            seed=said.whole("seed", 0, MOST),
+            take=said.one_of("take", Take) or Take.WHOLE,
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        said = dict(vars(self))
+        if self.take == Take.WHOLE:
+            del said["take"]
+        return said
+
+
+@dataclass(frozen=True)
+class JobHead:
+    """What is to be rendered.
+
+    Parameters
+    ----------
+    blend : the name of the file that was planned.
+    blender : the version that planned.
+    scene, view_layer : which of the file.
+    settings : ARTO's settings, by their names.
+    frames : their numbers.
+    subframe : of all frames.
+    catchers : those of the frames that show shadow catchers.
+    tiles : of each frame.
+    seeds : of each tile.
+    others : what the file says beside that.
+    """
+
+    blend: str
+    scene: str
+    view_layer: str
+    settings: Mapping[str, Any]
+    frames: tuple[int, ...]
+    tiles: int
+    seeds: int
+    subframe: float = 0.0
+    catchers: tuple[int, ...] = ()
+    blender: str = ""
+    others: Mapping[str, Any] = field(default_factory=dict)
+
+    @staticmethod
+    def read(said: Values) -> JobHead:
+        """From a `job.json`. Raises FarmError."""
+        if said.data.get("version") not in READABLE:
+            raise said.wrong("version", said.data.get("version"))
+        frames = _frames(said, "frames")
+        if not frames:
+            raise said.wrong("frames", list(frames))
+        catchers = _frames(said, "catchers")
+        if not set(catchers) <= set(frames):
+            raise said.wrong("catchers", list(catchers))
+        subframe = said.real("subframe", 0.0, 1.0)
+        head = JobHead(
+            blend=said.some_text("blend") or "",
+            scene=said.some_text("scene") or "",
+            view_layer=said.some_text("view_layer") or "",
+            settings=said.kind("settings", dict, {}),
+            frames=frames,
+            tiles=said.whole("tiles", 1, MOST),
+            seeds=said.whole("seeds", 1, MOST),
+            subframe=0.0 if subframe is None else subframe,
+            catchers=catchers,
+            blender=said.some_text("blender") or "",
+            others=said.others([*_WRITTEN, *(f.name for f in fields(JobHead))]),
+        )
+        if head.parts > MOST:
+            raise said.wrong("tiles", head.tiles)
+        return head
+
+    def to_json(self) -> dict[str, Any]:
+        """What `read` reads, in the order in which files have it."""
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "blend": self.blend,
+            "blender": self.blender,
+            "scene": self.scene,
+            "view_layer": self.view_layer,
+            "settings": dict(self.settings),
+            "frames": list(self.frames),
+            "subframe": self.subframe,
+            "catchers": list(self.catchers),
+            "tiles": self.tiles,
+            "seeds": self.seeds,
+            "parts": self.parts,
+            **self.others,
+        }
+
+    @property
+    def parts(self) -> int:
+        """How many parts the job has."""
+        catchers = set(self.catchers)
+        takes = sum(1 + len(TAKES) * (frame in catchers) for frame in self.frames)
+        return takes * self.tiles * self.seeds
+
+
+# What `to_json` writes that is no value of its own.
+_WRITTEN = ("format", "version", "parts")
+
+
+def _frames(said: Values, name: str) -> tuple[int, ...]:
+    """A list of frames; empty where there is none."""
+    found = said.kind(name, list, [])
+    if len(found) > MOST or any(
+        type(frame) is not int or abs(frame) > LARGEST_FRAME for frame in found
+    ):
+        raise said.wrong(name, found)
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class PartHead:
+    """What a rendered part says of itself.
+
+    Parameters
+    ----------
+    part : of its job.
+    key : of the capture that it is a part of.
+    samples : of each pixel.
+    files : the names of its EXR files, in its folder.
+    seconds : that it took.
+    fitted : where it was fitted and its images went, its entry in `field.json`.
+    """
+
+    part: Part
+    key: str
+    samples: int
+    files: tuple[str, ...]
+    seconds: float = 0.0
+    fitted: Mapping[str, Any] | None = None
+
+    @staticmethod
+    def read(said: Values) -> PartHead:
+        """From a `part.json`. Raises FarmError."""
+        files = said.kind("files", list, [])
+        part = Part.read(said.inside(said.kind("part", dict, {}), "part", "part."))
+        fitted = said.kind("fitted", dict)
+        # what it names is moved into the frame's field, in place of what has that name there
+        if fitted is not None and fitted_name(fitted) not in tile_names(part.tile):
+            raise said.wrong("fitted", fitted_name(fitted))
+        return PartHead(
+            part=part,
+            key=said.some_text("key") or "",
+            samples=said.whole("samples", 1, MOST_SAMPLES),
+            files=tuple(said.file_name(name, "files") for name in files),
+            seconds=said.real("seconds", 0, LONGEST) or 0.0,
+            fitted=fitted,
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """What `read` reads, in the order in which files have it."""
+        said: dict[str, Any] = {
+            "part": self.part.to_json(),
+            "key": self.key,
+            "samples": self.samples,
+        }
+        if self.fitted is not None:
+            said["fitted"] = dict(self.fitted)
+        return said | {"files": list(self.files), "seconds": self.seconds}
+
+
+def read(folder: Path) -> JobHead:
+    """The head of the job in a folder.
+
+    Raises
+    ------
+    FarmError : where there is none, or it is damaged.
+    """
+    path = folder / HEADER
+    if not path.is_file():
+        raise FarmError(f"there is no job in {folder}: run --command arto plan first")
+    return JobHead.read(Values(path, lambda text: FarmError(f"{text}: plan again")))
+
+
+def is_job(path: Path) -> bool:
+    """Whether a file says that it is the description of a farm's job, of whatever version."""
+    try:
+        return Values(path, FarmError).data.get("format") == FORMAT
+    except FarmError:
+        return False
+
+
+def write(folder: Path, head: JobHead) -> None:
+    """Write `job.json` into a folder. Raises FarmError."""
+    try:
+        write_text(folder / HEADER, json.dumps(head.to_json(), indent=1))
+    except OSError as e:
+        raise FarmError(f"{folder} cannot be written ({e}): choose another folder") from e
+
+
+def read_part(folder: Path) -> PartHead | None:
+    """What the part in a folder says of itself; None where it is not there. Raises FarmError."""
+    path = folder / PART_HEADER
+    if not path.is_file():
+        return None
+    return PartHead.read(Values(path, lambda text: FarmError(f"{text}: render that part again")))
+
+
+def write_part(folder: Path, head: PartHead) -> None:
+    """Write `part.json` into a folder. Raises OSError."""
+    write_text(folder / PART_HEADER, json.dumps(head.to_json(), indent=1))
