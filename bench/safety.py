@@ -6,7 +6,6 @@ others is gone or changed), `hang` (over a second) or `traceback`.
 
 from __future__ import annotations
 
-import json
 import os
 import random
 import tempfile
@@ -18,6 +17,7 @@ from typing import Any
 import numpy as np
 from arto.core import arrays, marked
 from arto.core.capture import capture_set
+from arto.core.capture.head import HEADER
 from arto.core.errors import ArtoError
 from arto.core.files import Lock, replace_folder
 from arto.core.hemicube import Hemicube
@@ -83,9 +83,9 @@ def _descriptions(folder: Path) -> list[tuple[str, str]]:
     """A value that was changed to another that may be is read: a description has no digest."""
     basis = np.ones((6, 3, 2, 3, 3), np.float32)
     capture_set.write(folder, Hemicube(patches=1), pattern_set("linear"), basis, key="a")
-    path = folder / capture_set.HEADER
+    path = folder / HEADER
     good = path.read_bytes()
-    head, found = json.loads(good), []
+    head, found = capture_set.CaptureSet(folder).head, []
     for case, bad in _damaged(good):
         path.write_bytes(bad)
         same = _outcome(lambda: capture_set.CaptureSet(folder).head == head)
