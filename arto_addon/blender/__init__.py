@@ -1,1 +1,1 @@
-"""What differs between versions of Blender: asked for here, and nowhere else."""
+"""What differs between versions of Blender. All other folders ask this one."""

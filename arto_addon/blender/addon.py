@@ -1,6 +1,7 @@
-"""The extension's own module, by the name that Blender has for it."""
+"""The name that Blender has for the extension's own module."""
 
 from __future__ import annotations
 
-# As `--addons` takes it: `bl_ext.<repository>.arto`, `arto` where it is installed for tests.
+# The name that the option `--addons` takes: `bl_ext.<repository>.arto` in Blender, and `arto` where
+# the package is installed for tests.
 ADDON = __name__.rpartition(".arto_addon")[0]

@@ -1,4 +1,4 @@
-"""The colour space that Blender works in: what its numbers mean where they are light."""
+"""The working space: the colour space in which Blender's numbers are light."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ _found: list[str] = []
 
 
 def working_space() -> str:
-    """Its name, as Blender lists it for images. Raises SceneError where that cannot be told."""
+    """Name the working space as Blender's list of colour spaces for images does.
+
+    Raises SceneError where the name cannot be found out.
+    """
     if FIVE:
         return bpy.data.colorspace.working_space
     if not _found:
@@ -21,8 +24,12 @@ def working_space() -> str:
 
 
 def _looked_up() -> str:
-    """Blender 4.5 says it nowhere, but has the library with it that it reads its configuration by;
-    and a studio's may have any space. Asked for while a panel is drawn, which may make nothing."""
+    """Find the working space of Blender 4.5, which has no property for it.
+
+    A studio's OpenColorIO configuration may choose any space. Blender brings along the library by
+    which it reads the configuration, so the library is asked first. A panel may call this while it
+    is drawn, so nothing is made in the file.
+    """
     listed = bpy.types.ColorManagedInputColorspaceSettings.bl_rna.properties["name"].enum_items
     found = _by_role() or _by_primaries()
     if found not in listed:
@@ -34,17 +41,17 @@ def _looked_up() -> str:
 
 
 def _by_role() -> str:
-    """As the configuration that Blender has read names it; empty where nothing reads that."""
+    """Read the working space from Blender's OpenColorIO configuration; empty where none is read."""
     bpy.utils.expose_bundled_modules()
     try:
         import PyOpenColorIO
-    except ImportError:  # a distribution's Blender may be without
+    except ImportError:  # a Linux distribution's Blender may come without the library
         return ""
     return PyOpenColorIO.GetCurrentConfig().getRoleColorSpace("scene_linear") or ""
 
 
 def _by_primaries() -> str:
-    """Blender's own, where the numbers are those of it; else empty."""
+    """Name Blender's default, where the working space has the primaries of Rec. 709; else empty."""
     for i in range(3):
         one = Color([float(i == j) for j in range(3)])
         other = one.from_scene_linear_to_rec709_linear()
@@ -54,8 +61,12 @@ def _by_primaries() -> str:
 
 
 def work_in(space: str) -> None:
-    """Have this Blender work in a space; before Blender 5 all work in that of their configuration.
-    The file that is open is no artist's: its colours stay numbers. Raises SceneError."""
+    """Have this Blender work in a colour space.
+
+    Call this where no artist's file is open, because the colours in the open file keep their
+    numbers.
+    Raises SceneError before Blender 5, where the configuration fixes another working space.
+    """
     if working_space() == space:
         return
     if not FIVE:

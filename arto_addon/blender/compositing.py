@@ -1,7 +1,7 @@
 """Blender's compositor: a scene's own, and one that is borrowed for a picture.
 
-From Blender 5 on a scene's compositor is a node group with an output, before it is a tree of the
-scene's with a Composite node; and what were settings of nodes became sockets.
+From Blender 5 on, a scene's compositor is a node group with an output. Before, it is a tree of the
+scene with a Composite node. Blender 5 also turned some settings of nodes into sockets.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from ..work import Render, blocking_render
 from .output import float_exr, write_to
 from .version import FIVE
 
-# The kind of node that puts a scene's picture out.
+# The kind of node that puts out a scene's picture.
 OUTPUT = "NodeGroupOutput" if FIVE else "CompositorNodeComposite"
-# By node and socket: the setting that Blender 4.5 has in the place of a menu.
+# By node and socket: the setting that Blender 4.5 has in the place of the socket.
 _SETTINGS = {
     ("CompositorNodeDenoise", "Prefilter"): "prefilter",
     ("CompositorNodeScale", "Type"): "space",
@@ -33,7 +33,7 @@ _SETTINGS = {
 
 
 def choose(node: bpy.types.Node, menu: str, choice: str) -> None:
-    """Choose of a node's menu, both by the names that the artist reads."""
+    """Choose an entry of a node's menu. Menu and choice are the names that the artist reads."""
     if FIVE:
         node.inputs[menu].default_value = choice
     else:
@@ -41,17 +41,20 @@ def choose(node: bpy.types.Node, menu: str, choice: str) -> None:
 
 
 def compositor(scene: bpy.types.Scene) -> bpy.types.NodeTree | None:
-    """The tree of a scene's compositor, None where it has none."""
+    """The tree of a scene's compositor; None where the scene has no compositor."""
     return scene.compositing_node_group if FIVE else scene.node_tree
 
 
 def turned_off(scene: bpy.types.Scene) -> bool:
-    """Whether a scene has a compositor that it does not use: Use Nodes, before Blender 5."""
+    """Whether a scene has a compositor and does not use it: Use Nodes is off, before Blender 5."""
     return not FIVE and scene.node_tree is not None and not scene.use_nodes
 
 
 def new_compositor(scene: bpy.types.Scene, name: str) -> bpy.types.NodeTree:
-    """An empty tree as the scene's compositor; its name is seen from Blender 5 on."""
+    """Give the scene an empty compositor, and return the compositor's tree.
+
+    name: the tree's name, used from Blender 5 on.
+    """
     if FIVE:
         tree = bpy.data.node_groups.new(name, "CompositorNodeTree")
         tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
@@ -63,20 +66,23 @@ def new_compositor(scene: bpy.types.Scene, name: str) -> bpy.types.NodeTree:
 
 
 def add_output(tree: bpy.types.NodeTree) -> bpy.types.Node:
-    """The node of a scene's compositor that puts out what is linked to its input 'Image'."""
+    """Add the output to a scene's compositor: a node that puts out what its input 'Image' gets."""
     return tree.nodes.new(OUTPUT)
 
 
 def mixed(
     tree: bpy.types.NodeTree, how: str, one: bpy.types.NodeSocket, other: bpy.types.NodeSocket
 ) -> bpy.types.NodeSocket:
-    """The sum or product of two colours in a compositor tree, a socket."""
+    """Add a node that mixes two colours in a compositor tree, and return its output socket.
+
+    how: Blender's name of the blend type, ADD or MULTIPLY.
+    """
     node = tree.nodes.new("ShaderNodeMix")
     node.data_type, node.blend_type, node.clamp_factor = "RGBA", how, False
     sockets = [s for s in node.inputs if s.enabled]
     sockets[0].default_value = 1.0
     for socket in sockets[1:]:
-        # what is shown of a layer that is gone
+        # A layer that is gone from the file has no link any more: it then adds black.
         socket.default_value = (0, 0, 0, 1)
     tree.links.new(one, sockets[1])
     tree.links.new(other, sockets[2])
@@ -84,23 +90,30 @@ def mixed(
 
 
 def places_of_groups() -> Iterator[bpy.types.NodeTree]:
-    """Every tree that may have a compositor's node group in it."""
+    """Yield every tree that may contain a node group of the compositor."""
     yield from bpy.data.node_groups
     if not FIVE:
         yield from (s.node_tree for s in bpy.data.scenes if s.node_tree)
 
 
 def own_compositor(copy: bpy.types.Scene, made: list[bpy.types.ID]) -> bpy.types.NodeTree:
-    """The tree of a copied scene's compositor, made its own; noted in `made` where it must go."""
+    """Give a copied scene a compositor tree of its own, and return the tree.
+
+    A tree that must be removed with the scene is added to `made`.
+    """
     if not FIVE:
-        return copy.node_tree  # which was copied with it
+        return copy.node_tree  # Blender has copied the tree with the scene.
     copy.compositing_node_group = copy.compositing_node_group.copy()
     made.append(copy.compositing_node_group)
     return copy.compositing_node_group
 
 
 class Darkroom:
-    """scene: the borrowed one, with its tree; made: what goes with it; folder: of files."""
+    """A borrowed compositor.
+
+    scene, tree: the borrowed scene and its compositor's tree; made: the data-blocks that are
+    removed at the end; folder: for files, also removed at the end.
+    """
 
     def __init__(
         self,
@@ -114,9 +127,9 @@ class Darkroom:
     def composite(
         self, socket: bpy.types.NodeSocket | None, size: tuple[int, int], text: str
     ) -> NDArray[np.float32]:
-        """What comes out of a socket of the tree, (H, W, 4), scene-linear, in full precision.
+        """Composite what a socket of the tree gives -> (H, W, 4), scene-linear, full precision.
 
-        size: width and height; text: what this is, where it is told. Raises CancelledError.
+        size: width and height; text: what the progress line says. Raises CancelledError.
         """
         self.tree.links.new(socket, add_output(self.tree).inputs[0])
         render = self.scene.render
@@ -127,9 +140,10 @@ class Darkroom:
 
 
 def composited(scene: bpy.types.Scene, text: str) -> NDArray[np.float32]:
-    """What a scene's compositor puts out, (H, W, 4), scene-linear, in full precision.
+    """Composite what a scene's compositor puts out -> (H, W, 4), scene-linear, full precision.
 
-    The scene is one to throw away: its settings are changed. Raises CancelledError.
+    The settings of the scene are changed, so give a scene that is thrown away. Raises
+    CancelledError.
     """
     render = scene.render
     render.use_compositing = True
@@ -146,7 +160,7 @@ def composited(scene: bpy.types.Scene, text: str) -> NDArray[np.float32]:
 
 @contextmanager
 def darkroom(name: str) -> Iterator[Darkroom]:
-    """A compositor to build a tree in."""
+    """Borrow a compositor in which to build a tree; all that was made is removed at the end."""
     scene = bpy.data.scenes.new(name)
     made: list[bpy.types.ID] = [scene]
     try:

@@ -1,7 +1,7 @@
-"""Open Image Denoise, through the compositor's Denoise node, so that no library ships.
+"""Open Image Denoise, through the compositor's Denoise node, so that ARTO ships no library.
 
-Some builds of Blender have the node without the library: it then hands its input through without a
-word. So a picture of known noise is denoised once, and what cannot denoise says so.
+Some builds of Blender have the node without the library. The node then hands its input through and
+gives no error. So `available` denoises a picture of known noise once and looks at the result.
 """
 
 from __future__ import annotations
@@ -18,8 +18,10 @@ _available: list[bool] = []
 
 
 def known() -> bool | None:
-    """Whether this Blender says that it denoises, at once: a panel cannot try it. None where
-    nothing is known."""
+    """Whether this Blender says that it can denoise; None where it says nothing.
+
+    This takes no time, so a panel can ask it. `available` renders to find out.
+    """
     try:
         import _cycles
     except ImportError:
@@ -28,7 +30,7 @@ def known() -> bool | None:
 
 
 def available() -> bool:
-    """Whether this Blender really denoises."""
+    """Whether this Blender really denoises, tried once."""
     if not _available:
         rng = np.random.default_rng(0)
         noisy = rng.exponential(size=(64, 64, 3)).astype(np.float32)
@@ -36,7 +38,7 @@ def available() -> bool:
     return _available[0]
 
 
-# Of a scene's render settings, those of the compositor's denoiser.
+# The render settings of a scene that the compositor's denoiser reads.
 _DENOISER = ("compositor_denoise_device", "compositor_denoise_final_quality")
 
 
@@ -46,12 +48,12 @@ def denoise(
     clean: bool = False,
     like: bpy.types.Scene | None = None,
 ) -> NDArray[np.float32]:
-    """The sum of pictures (H, W, 3), scene-linear, each denoised by itself.
+    """Denoise pictures (H, W, 3), scene-linear, each by itself, and return their sum.
 
-    Parts of a picture with noise of different size are cleaned better one by one.
-    guides: `albedo` and `normal`, (H, W, 3), or neither; clean: they have next to no noise, and
-    need not be denoised themselves, which takes longer than the pictures; like: the scene whose
-    denoiser it is, by device and quality.
+    Parts of a picture whose noise differs in size are cleaned better one by one.
+    guides: `albedo` and `normal`, (H, W, 3), or neither; clean: whether the guides have next to no
+    noise, so that the denoiser need not clean the guides first, which takes longer than the
+    pictures; like: the scene whose device and quality of the denoiser are used.
     """
     height, width = pictures[0].shape[:2]
     with darkroom("ARTO Denoise") as on:

@@ -23,7 +23,10 @@ class Devices:
 
 
 def chosen() -> Devices | None:
-    """The artist's render devices, though the preferences were not saved; None without Cycles."""
+    """The artist's render devices as they are now in the preferences, saved or not.
+
+    None without Cycles.
+    """
     addon = bpy.context.preferences.addons.get("cycles")
     if addon is None:
         return None
@@ -34,7 +37,10 @@ def chosen() -> Devices | None:
 
 
 def use(devices: Devices | None) -> None:
-    """Render with the devices that `chosen` gave. Raises SceneError for a kind that is not here."""
+    """Render with the devices that `chosen` gave; with None, change nothing.
+
+    Raises SceneError where Cycles on this machine has no devices of that kind.
+    """
     addon = bpy.context.preferences.addons.get("cycles")
     if addon is None or devices is None:
         return

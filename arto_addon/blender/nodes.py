@@ -11,13 +11,13 @@ from .version import FIVE
 
 
 class Nodes:
-    """A few calls that make building a node tree read like the formula it is."""
+    """Calls by which the code that builds a node tree reads like the formula."""
 
     def __init__(self, tree: bpy.types.NodeTree) -> None:
         self.tree = tree
 
     def add(self, kind: str, *inputs: Any, operation: str = "") -> Any:
-        """A node with its inputs linked (sockets) or set (values)."""
+        """Add a node. Each input that is a socket is linked, and any other is set as a value."""
         node = self.tree.nodes.new(kind)
         if operation:
             node.operation = operation
@@ -49,13 +49,15 @@ def _noded(block: Any) -> Any:
 
 
 def shader_tree(block: bpy.types.ID) -> bpy.types.NodeTree | None:
-    """The tree that a material, world or lamp is rendered by; None where it has none in use."""
+    """The node tree by which a material, world or lamp is rendered; None where none is in use."""
     return block.node_tree if FIVE or block.use_nodes else None
 
 
 def made_of_nodes(material: bpy.types.Material) -> bpy.types.NodeTree:
-    """The tree that a material of our own is rendered by. One that does without nodes, as it can
-    before Blender 5, gets those that look the same."""
+    """The node tree by which a material of ARTO's own is rendered.
+
+    Before Blender 5 a material can do without nodes. Such a material gets nodes that look the same.
+    """
     if shader_tree(material) is None:
         material.use_nodes = True
         tree = material.node_tree
@@ -66,8 +68,11 @@ def made_of_nodes(material: bpy.types.Material) -> bpy.types.NodeTree:
 
 
 def world_of_nodes(world: bpy.types.World) -> bpy.types.NodeTree:
-    """The tree of a world, which is given one where it does without, as it can before Blender 5:
-    one that shows its colour, as the world did."""
+    """The node tree of a world.
+
+    Before Blender 5 a world can do without nodes. Such a world gets nodes that show its colour, as
+    the world did before.
+    """
     if shader_tree(world) is None:
         world.use_nodes = True
         tree = world.node_tree
@@ -79,7 +84,7 @@ def world_of_nodes(world: bpy.types.World) -> bpy.types.NodeTree:
 
 
 def trees(tree: bpy.types.NodeTree | None, seen: set[int]) -> Iterator[bpy.types.NodeTree]:
-    """A node tree and the groups in it, each once."""
+    """Yield a node tree and the trees of all groups in it, each once."""
     if tree is None or tree.as_pointer() in seen:
         return
     seen.add(tree.as_pointer())

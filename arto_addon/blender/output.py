@@ -8,8 +8,8 @@ import bpy
 
 from .version import FIVE
 
-# What of a scene's render settings decides how a picture is written, or what is laid over it, and
-# not what is rendered: each as here, whatever the artist's file says.
+# The render settings that decide how a picture is written or what is laid over it. They do not
+# change what is rendered. ARTO sets each to the value here, whatever the artist's file says.
 _WRITING = {
     "use_file_extension": False,
     "use_overwrite": True,
@@ -21,15 +21,18 @@ _WRITING = {
     "dither_intensity": 0.0,
 }
 if FIVE:
-    _WRITING["save_output"] = True  # before, what is rendered to be written is written
+    _WRITING["save_output"] = True  # Blender 4.5 always saves what is rendered to a file.
 
 
 def _as_new(settings: bpy.types.ImageFormatSettings) -> None:
-    """Every setting as a new scene has it; a file brings those of the version that made it."""
+    """Set every format setting to the value in a new scene.
+
+    An older .blend has the values of the Blender that saved it.
+    """
     new = bpy.data.scenes.new("ARTO Output")
     try:
         there = new.render.image_settings
-        # what may be chosen for the rest follows from these
+        # The allowed values of the other settings depend on these.
         first = ["media_type", "file_format"] if FIVE else ["file_format"]
         names = [p.identifier for p in there.bl_rna.properties if not p.is_readonly]
         for name in first + [n for n in names if n not in first]:
@@ -39,14 +42,17 @@ def _as_new(settings: bpy.types.ImageFormatSettings) -> None:
 
 
 def set_format(settings: bpy.types.ImageFormatSettings, media: str, kind: str) -> None:
-    """Choose a file format; from Blender 5 on it is among those of a medium."""
+    """Choose a file format; from Blender 5 on, the medium is chosen first."""
     if FIVE:
         settings.media_type = media
     settings.file_format = kind
 
 
 def float_exr(render: bpy.types.RenderSettings, multilayer: bool = True) -> None:
-    """Set a scene's output to 32-bit float EXR of a part for each pass, and nothing over it."""
+    """Set a scene's output to 32-bit float EXR with nothing laid over the picture.
+
+    multilayer: write all passes, from Blender 5 on as a part for each pass; else the picture alone.
+    """
     for name, value in _WRITING.items():
         setattr(render, name, value)
     settings = render.image_settings
@@ -57,15 +63,15 @@ def float_exr(render: bpy.types.RenderSettings, multilayer: bool = True) -> None
         set_format(settings, "IMAGE", "OPEN_EXR")
     settings.color_mode = "RGBA"
     settings.color_depth = "32"
-    settings.exr_codec = "NONE"  # files that are read again at once; packing takes longer
+    settings.exr_codec = "NONE"  # The files are read again at once, and packing would take longer.
     if FIVE:
-        settings.use_exr_interleave = False  # a part for each layer; before, one of all
+        settings.use_exr_interleave = False  # A part for each pass; Blender 4.5 writes one for all.
     settings.color_management = "FOLLOW_SCENE"
 
 
 def write_to(render: bpy.types.RenderSettings, path: Path) -> None:
-    """Have a scene's next render written to this very path.
+    """Have a scene's next render written to exactly this path.
 
-    An output path of Blender is a template, in which a brace that is meant stands twice.
+    Blender reads an output path as a template, in which a literal brace is written twice.
     """
     render.filepath = str(path).replace("{", "{{").replace("}", "}}")

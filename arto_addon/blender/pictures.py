@@ -1,4 +1,4 @@
-"""Pictures that are made in the window and are of no file, as images."""
+"""Pictures that are made in memory, as Blender's images without a file."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from .colour import working_space
 
 
 def put(name: str, picture: NDArray, display: bool = False) -> bpy.types.Image:
-    """A picture (H, W, 4), scene-linear, premultiplied, rows top-down, as the image of that name.
+    """Show a picture as Blender's image of a name, which is made where there is none.
 
-    display: it is as a display shows it; else it is shown as a render is, by exposure and look.
+    picture: (H, W, 4), scene-linear, premultiplied, rows top-down; display: show the numbers as
+    they are, else as a render is shown, with exposure and look.
     """
     height, width = picture.shape[:2]
     image = bpy.data.images.get(name)

@@ -14,12 +14,12 @@ def when_quitting(handler: Callable[..., None]) -> None:
     """Have a handler called when Blender quits."""
     if FIVE:
         bpy.app.handlers.exit_pre.append(handler)
-    else:  # Blender 4.5 tells nobody, but ends its Python in order
+    else:  # Blender 4.5 has no handler for this, but ends its Python in order.
         atexit.register(handler)
 
 
 def not_when_quitting(handler: Callable[..., None]) -> None:
-    """No longer, if it was to be called."""
+    """Have a handler no longer called when Blender quits; nothing happens for an unknown one."""
     if not FIVE:
         atexit.unregister(handler)
     elif handler in bpy.app.handlers.exit_pre:

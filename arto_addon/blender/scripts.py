@@ -1,7 +1,7 @@
-"""Whether Python in a .blend may run: as the artist has decided for this session, and else not.
+"""Whether Python in a .blend may run: only where the artist has allowed it for this session.
 
-A file can bring Python with it: registered texts, and drivers. Blender runs these only where the
-artist allows it, and another Blender that ARTO starts must not allow more.
+A file can bring Python with it: registered texts, and drivers. Blender runs both only where the
+artist allows scripts. Another Blender that ARTO starts must not allow more.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ import bpy
 from ...core.errors import SceneError
 
 ALLOWED, REFUSED = "--enable-autoexec", "--disable-autoexec"
-# What Blender's command line says about scripts, and what it means.
+# The options of Blender's command line about scripts, in both spellings.
 _SAID = {"-y": ALLOWED, ALLOWED: ALLOWED, "-Y": REFUSED, REFUSED: REFUSED}
 
 
 def option() -> str:
     """The option that another Blender gets: `ALLOWED` or `REFUSED`.
 
-    Scripts are allowed only where this session was started with them, or the artist's preference
-    allows them and names no exception for this file; and nowhere where this session has refused
-    one.
+    Where this session has refused a script, the answer is `REFUSED`. Else the session's own command
+    line decides. Where the command line says nothing, the artist's preference decides, with its
+    exceptions for folders.
     """
     if bpy.app.autoexec_fail:
         return REFUSED
-    # what follows a lone -- is another program's
+    # Arguments after a lone -- are not Blender's.
     arguments = sys.argv[: sys.argv.index("--")] if "--" in sys.argv else sys.argv
     if said := [_SAID[a] for a in arguments if a in _SAID]:
         return said[-1]
@@ -40,8 +40,10 @@ def option() -> str:
 
 
 def check_drivers() -> None:
-    """Raise SceneError where Blender has refused a driver's Python since the file was opened: the
-    driver gives 0, and the picture would be another one."""
+    """Raise SceneError where Blender has refused a driver's Python since the file was opened.
+
+    The refused driver gives 0, so the picture would be wrong.
+    """
     told = bpy.app.autoexec_fail_message
     if bpy.app.autoexec_fail and told.startswith("Driver"):
         raise SceneError(
@@ -52,8 +54,11 @@ def check_drivers() -> None:
 
 
 def _is_excluded(blend: str) -> bool:
-    """Whether the artist's preferences name the folder of a file as one whose scripts do not run.
-    The snapshot that a job works on lies in another folder."""
+    """Whether the artist's preferences exclude the folder of a .blend from running scripts.
+
+    The window asks this before a job starts. The job itself could not: its snapshot of the .blend
+    lies in another folder.
+    """
     folder = os.path.normcase(Path(blend).parent) + os.sep if blend else ""
     for excluded in bpy.context.preferences.autoexec_paths:
         path = os.path.normcase(excluded.path)

@@ -4,6 +4,6 @@ from __future__ import annotations
 
 import bpy
 
-# Blender 5 made the compositor's tree a node group like any other, gave every material and world
-# its nodes, and may work in another colour space than that of its start. Before it is 4.5 LTS.
+# True from Blender 5 on; else this is 4.5 LTS. In Blender 5 the compositor's tree is a node group
+# like any other, every material and world has nodes, and the working space can be changed.
 FIVE = bpy.app.version >= (5, 0, 0)
