@@ -30,6 +30,7 @@ from scene_tools import (
 from shot_tools import unfinished
 
 
+@pytest.mark.newest
 @pytest.mark.parametrize("route", ["pattern", "single"])
 def test_routes_agree(noise, route):
     """Two routes differ by as much as two seeds of one route do: pixel by pixel in the square, and

@@ -121,6 +121,7 @@ def test_the_fields_part_is_the_uniform_transport(tmp_path, support):
     assert of_field.share[bare].mean() == pytest.approx(of_capture.share[bare].mean(), rel=1e-4)
 
 
+@pytest.mark.newest
 @pytest.mark.parametrize("world", ["white", "sun"])
 def test_on_an_empty_ground_footage_passes_denoised_too(tmp_path, world):
     """The ratio is 1 everywhere and the comp is the footage, whatever light there is."""

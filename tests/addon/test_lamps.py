@@ -71,6 +71,7 @@ def relit(scene, **settings) -> tuple[np.ndarray, str]:
             setattr(scene.arto, name, value)
 
 
+@pytest.mark.newest
 def test_with_its_lamps_the_plate_is_what_cycles_renders(shot, tmp_path):
     """Against Cycles, beside the noise of two of its renders: four large patches a face blur a sun
     of eight degrees, a render of its own does not."""

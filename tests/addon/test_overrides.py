@@ -21,6 +21,7 @@ def world_of_colour(colour):
     return world
 
 
+@pytest.mark.newest
 @pytest.mark.parametrize("kind", ["world", "glow"])
 def test_plate_of_a_view_layer_with_an_override(tmp_path, kind):
     """The plate is what Cycles renders of that layer: with its world, or with its one material

@@ -101,6 +101,7 @@ def test_as_cycles_own_pass(shot, tmp_path, camera):
     np.testing.assert_allclose(depth[hit], far, rtol=1e-5)
 
 
+@pytest.mark.newest
 @pytest.mark.parametrize("camera", ["perspective", "shifted", "orthographic"])
 def test_the_camera_sees_each_place_in_its_pixel(shot, camera):
     """But for what the pixel filter reaches beyond."""
