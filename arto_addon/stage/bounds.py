@@ -1,7 +1,7 @@
-"""What the scene renders: how large it is, and what of it ARTO has to know.
+"""What the scene renders: its bounds, its shadow catchers and its other things.
 
-Blender tells a render engine, and nobody else, what is rendered: with render visibility, instances,
-linked data and modifiers at their render settings. So a render engine is what asks.
+Only a render engine learns from Blender what is rendered, with render visibility, instances, linked
+data and modifiers at their render settings. So a small render engine of ARTO's own asks.
 """
 
 from __future__ import annotations
@@ -17,27 +17,31 @@ from ...core.errors import SceneError
 from ..work import last_properties_kept
 from .stage import Stage
 
-# An object's name, and the file of its library or nothing.
+# An object's name, and the path of the library that the object is linked from, or "".
 Name = tuple[str, str]
 
 
 @dataclass
 class Rendered:
-    """low, high: the corners (3,) of all that a render shows; catchers: the names of its shadow
-    catchers, as they are rendered; flagged: the objects that make them be some, and things: those
-    of all else, each by name and library."""
+    """What a scene renders.
+
+    low, high: the corners (3,) of the box around all that a render shows; catchers: the names of
+    the objects that are rendered as shadow catchers; flagged: the objects that have the flag Shadow
+    Catcher, by which they or their instances are catchers; things: all other rendered objects.
+    """
 
     low: NDArray[np.float64] = field(default_factory=lambda: np.full(3, np.inf))
     high: NDArray[np.float64] = field(default_factory=lambda: np.full(3, -np.inf))
     catchers: list[str] = field(default_factory=list)
     flagged: set[Name] = field(default_factory=set)
     things: set[Name] = field(default_factory=set)
-    # what makes instances of catchers, and what is one as the instance of one alone
+    # makers: objects that make instances of catchers. made: objects that are a catcher only because
+    # a catcher makes instances of them.
     makers: set[Name] = field(default_factory=set)
     made: set[Name] = field(default_factory=set)
 
     def bounds(self) -> tuple[tuple[float, float, float], float]:
-        """Centre and radius. Raises SceneError where there is nothing to see."""
+        """The centre and radius of all that is seen. Raises SceneError where nothing is."""
         if not np.isfinite(self.low).all():
             raise SceneError("the scene shows nothing: unhide what should be captured")
         centre = (self.low + self.high) / 2
@@ -54,7 +58,7 @@ class Rendered:
             )
 
     def note(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
-        """Note what is rendered as a catcher or as a thing."""
+        """Note whether an instance is rendered as a catcher or as a thing."""
         one, parent = instance.object, instance.parent
         if one.is_shadow_catcher:
             self.catchers.append(one.name)
@@ -62,7 +66,7 @@ class Rendered:
             if parent:
                 self.makers.add(_name(parent))
         elif parent and parent.is_shadow_catcher:
-            # what is made by a catcher is one
+            # Cycles renders the instances that a catcher makes as catchers.
             self.catchers.append(one.name)
             self.flagged.add(_name(parent))
             self.made.add(_name(one))
@@ -79,7 +83,7 @@ _found: list[Rendered] = []
 
 
 def _local_corners(data: bpy.types.Object) -> list[Vector] | None:
-    """The corners of an evaluated object's bounding box, None where it has no shape."""
+    """The corners of an evaluated object's bounding box; None where the object has no shape."""
     if data.type not in {
         "MESH",
         "CURVE",
@@ -96,7 +100,7 @@ def _local_corners(data: bpy.types.Object) -> list[Vector] | None:
         return None
     corners = [Vector(c) for c in data.bound_box]
     low, high = (Vector(f(c[i] for c in corners) for i in range(3)) for f in (min, max))
-    # an object without geometry has the unit box of -1, or one turned inside out
+    # The bounding box of an object without geometry runs from -1 to 1.
     if data.type not in {"MESH"} and (low == Vector((-1, -1, -1)) and high == Vector((1, 1, 1))):
         return corners if data.type == "VOLUME" else None
     return corners
@@ -124,7 +128,11 @@ class _BoundsEngine(bpy.types.RenderEngine):
 
 
 def rendered(stage: Stage) -> Rendered:
-    """What the stage's scene renders; without the hemicube, which is not on the stage yet."""
+    """Find out what the stage's scene renders.
+
+    Call this before the hemicube is on the stage, as its planes would count. Raises SceneError
+    where Blender renders nothing.
+    """
     scene = stage.scene
     render = scene.render
     settings = {
@@ -152,6 +160,8 @@ def rendered(stage: Stage) -> Rendered:
 
 
 def scene_bounds(stage: Stage) -> tuple[tuple[float, float, float], float]:
-    """Centre and radius of what the stage's scene renders. Raises SceneError where there is nothing
-    to see."""
+    """The centre and radius of what the stage's scene renders.
+
+    Raises SceneError where nothing is seen.
+    """
     return rendered(stage).bounds()

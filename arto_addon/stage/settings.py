@@ -1,7 +1,8 @@
-"""What is switched off on the stage: whatever bends the light, or takes a picture apart.
+"""The render settings that a capture changes on the stage, and why.
 
-All of it happens to the stage, a copy of the scene. The page docs/capture-changes.md is made of
-this table, and the panel says where an artist's own setting makes a render look otherwise.
+A capture needs light that adds up, so settings that bend the light are switched off. The changes
+are made on the stage, a copy of the scene. The page docs/capture-changes.md is made of this table.
+From it the panel also knows where the artist's own setting makes a render look otherwise.
 """
 
 from __future__ import annotations
@@ -16,8 +17,11 @@ from .stage import Stage
 
 @dataclass(frozen=True)
 class Change:
-    """setting: by its path from the scene; to: its value while capturing, or that in words; why;
-    look: for the panel, where the artist's own value makes a render look otherwise, `{}` being it.
+    """A setting that a capture changes.
+
+    setting: the path from the scene; to: the value while capturing, or words for that value; why:
+    the reason; look: the sentence of the panel where the artist's own value makes a render look
+    otherwise than the relit picture, with `{}` for the artist's value.
     """
 
     setting: str
@@ -26,7 +30,7 @@ class Change:
     look: str = ""
 
 
-# In words: it hangs on the capture's settings.
+# Words for values that depend on the capture's settings.
 SAMPLES, SEED, THROUGH = "the capture's samples", "the capture's seed", "as before, and the patches"
 CHANGES = (
     Change("cycles.samples", SAMPLES, "its noise is the main error of the relit picture"),
@@ -60,7 +64,10 @@ CHANGES = (
 
 
 def prepare(on: Stage, layers: int) -> None:
-    """Switch off on the stage whatever would bend the light or take it apart."""
+    """Make all changes of the table on the stage, and give it a black world.
+
+    layers: how many patterns a path may cross, each of which counts as a transparent bounce.
+    """
     s = on.scene.arto
     through = on.scene.cycles.transparent_max_bounces + layers
     words: dict[object, object] = {SAMPLES: samples_of(on.scene), SEED: s.seed, THROUGH: through}
@@ -76,18 +83,22 @@ def prepare(on: Stage, layers: int) -> None:
     layer.world_override = None
 
 
-# What a scene's own samples are multiplied by; with a noise threshold few pixels take them all.
+# By quality: the factor on a scene's own samples. Where a scene has a noise threshold, few pixels
+# take all samples, so no more than MOST_ADAPTIVE count.
 QUALITIES = {"DRAFT": 0.25, "GOOD": 1.0, "FINAL": 4.0}
 MOST_ADAPTIVE = 256
 
 
 def samples_told(scene: bpy.types.Scene) -> bool:
-    """Whether a file from before there was a choice, or a script, says how many samples."""
+    """Whether the samples were set and the quality was not.
+
+    This is so in files from before the setting `quality`, and in scripts that set samples alone.
+    """
     return scene.arto.is_property_set("samples") and not scene.arto.is_property_set("quality")
 
 
 def samples_of(scene: bpy.types.Scene) -> int:
-    """The samples of a capture, by the quality that the artist chose."""
+    """The samples of a capture, by the quality or the number that the artist chose."""
     s, cycles = scene.arto, scene.cycles
     if s.quality == "CUSTOM" or samples_told(scene):
         return s.samples
@@ -96,7 +107,10 @@ def samples_of(scene: bpy.types.Scene) -> int:
 
 
 def looks_otherwise(scene: bpy.types.Scene) -> list[str]:
-    """Where a render of the artist's looks otherwise than the relit picture, by his settings."""
+    """Say by which of its settings the artist's render looks otherwise than the relit picture.
+
+    A sentence for each such setting, untranslated.
+    """
     found = []
     for change in CHANGES:
         value = scene.path_resolve(change.setting)

@@ -1,4 +1,4 @@
-"""A small and quick render of the stage: for looking at the scene before the long ones."""
+"""A small and quick render of the stage, to look at the scene before the long renders."""
 
 from __future__ import annotations
 
@@ -17,14 +17,17 @@ from ..blender.output import write_to
 from ..work import Render, Steps
 from .stage import Pace, Stage, picture_region, picture_size
 
-# Pixels of a small render: its cost is the same for a picture of any size.
+# Pixels of a small render, whatever the picture's size, so that the cost is always the same.
 PIXELS = 1728
 _RENDER = ("resolution_x", "resolution_y", "resolution_percentage", "use_crop_to_border")
 
 
 @contextmanager
 def small(on: Stage, samples: int) -> Iterator[None]:
-    """The stage so small that what is captured, a render region of the artist's, has `PIXELS`."""
+    """Make the stage so small that the captured region has about `PIXELS`; put back at the end.
+
+    The captured region is the artist's render region, or the whole picture.
+    """
     render, cycles = on.scene.render, on.scene.cycles
     width, height = picture_size(on.scene)
     share = math.sqrt(PIXELS / picture_region(on.scene).pixels)
@@ -43,9 +46,10 @@ def small(on: Stage, samples: int) -> Iterator[None]:
 
 
 def parts_of(on: Stage, text: str, share: float = 0.0, span: float = 0.0) -> Steps:
-    """Render the stage as it stands -> its parts by name, `exr.read`. Raises CancelledError.
+    """Render the stage as it stands -> the render's parts by name, as `exr.read` gives them.
 
-    share: how far the whole work is; span: how much of it this is.
+    share: how much of the whole work was done before, 0 to 1; span: how much of the whole work this
+    render is. Raises CancelledError.
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "small.exr"
@@ -60,7 +64,7 @@ def parts_of(on: Stage, text: str, share: float = 0.0, span: float = 0.0) -> Ste
 
 
 class _Laps:
-    """When a render's parts began: the preparation, the paths, the writing, and its end."""
+    """When a render began, when its first and last paths were traced, and when it ended."""
 
     def __init__(self) -> None:
         self.begun = self.traced = self.written = self.ended = time.perf_counter()
@@ -76,7 +80,7 @@ class _Laps:
 
 @contextmanager
 def _timed() -> Iterator[_Laps]:
-    """What a render takes, by what Cycles says that it does."""
+    """Time a render's stages, which Cycles' status lines tell apart."""
     laps = _Laps()
     traced: list[float] = []
 

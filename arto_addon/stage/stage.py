@@ -1,8 +1,8 @@
 """The stage: a copy of the artist's scene in which everything may be changed.
 
-Capturing switches off whatever bends the light and hangs a few hundred patches around the scene.
-None of it happens to the artist's scene: it happens to a copy that shares its objects, and the
-copy is thrown away on every way out. There is nothing to put back.
+Capturing switches off whatever bends the light, and hangs a few hundred patches around the scene.
+All this happens to a copy of the artist's scene. The copy shares the scene's objects and owns its
+settings. It is thrown away on every way out, so there is nothing to put back.
 """
 
 from __future__ import annotations
@@ -20,14 +20,17 @@ from ...core.errors import SceneError
 from ...core.region import Region
 from ..blender.output import float_exr
 
-# What carries light out of a render besides Combined and is of no use here.
+# Passes of a view layer that stay on. A stage needs no other pass, and each would cost memory.
 _KEEP_PASSES = {"use_pass_combined", "use_pass_z"}
 
 
 @dataclass(frozen=True)
 class Pace:
-    """How fast a stage renders. ready: seconds until the first path; path: seconds of one; layer:
-    seconds of writing one."""
+    """How fast a stage renders.
+
+    ready: seconds until the first path; path: seconds for a path; layer: seconds for writing a
+    layer.
+    """
 
     ready: float
     path: float
@@ -50,13 +53,13 @@ class Stage:
         return block
 
     def remove(self, blocks: list[bpy.types.ID]) -> None:
-        """Remove some of them early."""
+        """Remove some of the stage's data-blocks before the stage goes."""
         gone = {b.as_pointer() for b in blocks}
         self._made = [b for b in self._made if b.as_pointer() not in gone]
         bpy.data.batch_remove(blocks)
 
     def change(self, path: str, value: object) -> None:
-        """Set `scene.<path>`, and note what it was, for the capture set's description."""
+        """Set `scene.<path>`, and note old and new value for the capture set's description."""
         *owners, name = path.split(".")
         target: Any = self.scene
         for owner in owners:
@@ -71,10 +74,10 @@ class Stage:
 
 
 def _hold_still(out: Stage) -> None:
-    """Take the animation off the scene's settings: they stay as they are at this frame.
+    """Take the animation off the scene's settings, so that they stay as they are at this frame.
 
-    A key or a driver is asked again when the render begins, and would overrule what is set here.
-    The scene's custom properties keep theirs: drivers of objects read them.
+    Blender evaluates keys and drivers again when the render begins, which would undo what is set on
+    the stage. The scene's custom properties stay animated, because drivers of objects read them.
     """
     animation = out.scene.animation_data
     if animation is None:
@@ -96,9 +99,11 @@ def _hold_still(out: Stage) -> None:
 
 
 def free_mark() -> str:
-    """What the names of our light groups begin with: `ARTO_`, or with a number after ARTO where a
-    group of the artist's begins so. What is in a group of the artist's is in none on the stage, and
-    must not come into one of ours."""
+    """Find a beginning for the names of ARTO's light groups that no group of the artist's has.
+
+    It is `ARTO_`, or `ARTO-2_` and so on where that is taken. The stage has no light groups of the
+    artist's, but objects keep the names of theirs. An object must not fall into a group of ARTO's.
+    """
     taken = {block.lightgroup for kind in (bpy.data.objects, bpy.data.worlds) for block in kind}
     marks = itertools.chain(["ARTO_"], (f"ARTO-{i}_" for i in itertools.count(2)))
     return next(m for m in marks if not any(group.startswith(m) for group in taken))
@@ -106,7 +111,10 @@ def free_mark() -> str:
 
 @contextmanager
 def stage(scene: bpy.types.Scene, view_layer: str) -> Iterator[Stage]:
-    """A copy of `scene` with only `view_layer` in use, without compositing and extra passes."""
+    """Copy `scene` with only `view_layer`, without compositing and extra passes.
+
+    The copy is removed at the end. Raises SceneError where the scene has no such view layer.
+    """
     if not scene.view_layers.get(view_layer):
         raise SceneError(f"the scene has no view layer '{view_layer}'")
     copy = scene.copy()
@@ -118,7 +126,7 @@ def stage(scene: bpy.types.Scene, view_layer: str) -> Iterator[Stage]:
             if layer.name != view_layer:
                 copy.view_layers.remove(layer)
         layer = copy.view_layers[0]
-        layer.use = True  # it is the one that was asked for, whatever F12 renders
+        layer.use = True  # The caller wants this layer, even where F12 does not render it.
         for prop in layer.bl_rna.properties:
             if prop.identifier.startswith("use_pass_"):
                 setattr(layer, prop.identifier, prop.identifier in _KEEP_PASSES)
@@ -127,7 +135,7 @@ def stage(scene: bpy.types.Scene, view_layer: str) -> Iterator[Stage]:
                 setattr(layer.cycles, prop.identifier, False)
         while layer.aovs:
             layer.aovs.remove(layer.aovs[0])
-        # the artist's own light groups are wanted in some renders alone, and cost memory
+        # Only some renders need the artist's own light groups, and each group costs memory.
         used = {thing.lightgroup for thing in copy.objects}
         out.own_groups = [g.name for g in layer.lightgroups if g.name in used]
         while layer.lightgroups:
@@ -140,21 +148,24 @@ def stage(scene: bpy.types.Scene, view_layer: str) -> Iterator[Stage]:
 
 
 def picture_size(scene: bpy.types.Scene) -> tuple[int, int]:
-    """(width, height) in pixels of a render of the scene."""
+    """The width and height of a render of the scene, in pixels."""
     r = scene.render
     share = r.resolution_percentage
     return r.resolution_x * share // 100, r.resolution_y * share // 100
 
 
 def picture_region(scene: bpy.types.Scene) -> Region:
-    """What the scene renders of its picture: all of it, or the artist's render region."""
+    """The part of its picture that the scene renders: all of it, or the artist's render region.
+
+    Raises SceneError where the render region is empty.
+    """
     width, height = picture_size(scene)
     r = scene.render
     if not r.use_border:
         return Region(0, 0, width, height)
 
     def edge(share: float, size: int) -> int:
-        # as Blender does: cut off, and in its own precision (0.7 of 10 pixels is 7)
+        # As in Blender: rounded down, and in single precision (0.7 of 10 pixels is 7).
         return int(np.float32(share) * np.float32(size))
 
     x0, x1 = edge(r.border_min_x, width), edge(r.border_max_x, width)
@@ -165,11 +176,11 @@ def picture_region(scene: bpy.types.Scene) -> Region:
 
 
 def set_region(scene: bpy.types.Scene, region: Region) -> None:
-    """Make the scene render just this region, cropped."""
+    """Make the scene render only this region, and crop the picture to the region."""
     width, height = picture_size(scene)
     r = scene.render
     r.use_border = r.use_crop_to_border = (region.width, region.height) != (width, height)
-    # a hundredth of a pixel inside, so that rounding cannot lose a row
+    # A hundredth of a pixel inside, so that rounding cannot lose a row.
     r.border_min_x = (region.x + 0.01) / width
     r.border_max_x = (region.x + region.width + 0.01) / width
     r.border_min_y = (height - region.y - region.height + 0.01) / height

@@ -1,11 +1,12 @@
 """Takes: a shot with shadow catchers is captured three times.
 
-Cycles gives the light on shadow catchers no light groups. So what is on the ground is told from the
-ground by pictures of the same light: everything as ordinary things; the catchers alone; and the
-things alone, which is what the light groups show of a scene with catchers. See `core.catcher`.
+Cycles sorts the light on shadow catchers into no light groups. So three pictures in the same light
+tell the things from the ground (see `core.catcher`). The first has everything, with the catchers as
+ordinary things. The second has the catchers alone. The third has the things alone, which is what
+the light groups show of a scene with catchers.
 
-Flags of objects say what is in a take. They are the artist's objects, which the stage shares: they
-are put back on every way out.
+Flags of objects decide what is in a take. The stage shares the artist's objects, so the flags are
+put back on every way out.
 """
 
 from __future__ import annotations
@@ -19,22 +20,26 @@ from ...core.capture.kinds import Take
 from ...core.errors import SceneError
 from .bounds import Name, Rendered
 
-# The names of takes: of everything, which is the only one where nothing catches shadows; of the
-# catchers alone; of the things alone.
+# The names of the takes. WHOLE has everything, and is the only take of a scene without catchers.
+# GROUND has the catchers alone, and THINGS the things alone.
 WHOLE, GROUND, THINGS = Take.WHOLE, Take.GROUND, Take.THINGS
-# Those beside the first, in the order of capturing. Their names are those of their folders in the
-# shot's.
+# The takes after the first, in the order of capturing. The name of a take is also the name of its
+# folder in the shot's folder.
 TAKES = (GROUND, THINGS)
 # In the description of a field of such a take: the key of the first.
 PAIR = "pair"
-# What rays an object is seen by.
+# The kinds of rays by which an object may be seen.
 _RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
 
 
 @contextmanager
 def take(seen: Rendered, name: str) -> Iterator[list[bpy.types.Object]]:
-    """The objects as a take of what is rendered has them; those that it has otherwise than the
-    artist. Raises SceneError."""
+    """Set the objects' flags as a take needs them, and put the flags back at the end.
+
+    seen: what the scene renders; name: the take's. Yields the objects whose flags the take needs to
+    set. Raises SceneError where the scene has no such take, or where catchers and things cannot be
+    told apart.
+    """
     if not seen.catchers:
         if name != WHOLE:
             raise SceneError(
@@ -69,7 +74,7 @@ def _originals(names: Iterable[Name]) -> list[bpy.types.Object]:
 
 
 def _check_still(thing: bpy.types.Object) -> None:
-    """Raise SceneError where a catcher's flags are animated: the render would set them anew."""
+    """Raise SceneError where a catcher's flags are animated, as the render would set them again."""
     animation = thing.animation_data
     if animation is None:
         return
@@ -87,5 +92,8 @@ def _check_still(thing: bpy.types.Object) -> None:
 
 
 def only_things(layer: bpy.types.ViewLayer) -> None:
-    """Have the alpha of a take of the things alone without the shadows, which have a pass then."""
+    """Leave the shadows out of the alpha of a take of the things alone.
+
+    Cycles does so where the pass Shadow Catcher is on: the shadows are then in that pass.
+    """
     layer.cycles.use_pass_shadow_catcher = True
