@@ -197,6 +197,7 @@ def test_a_killed_blender_is_said_and_another_one_is_started(scene) -> None:
         # in the middle of a question
         made.ask(scene, scene.view_layers[0].name, scene.world, "lost", False)
         made._process.kill()
+        made._process.wait(10)
         until = time.monotonic() + 240
         while made.busy and time.monotonic() < until:
             time.sleep(0.02)
