@@ -1,9 +1,10 @@
 """Live: while the switch is on, the shot follows its world.
 
-A timer looks what the world is (at most thirty times a second, and it does nothing that takes
-longer than a moment); maps of it are made by another Blender (`maps`), pictures by a thread
-(`viewer`). While the hand moves they are small, when it rests they are whole, and when it rests
-longer a relight is started, with the world's lamps and denoised.
+A timer looks at the world up to thirty times a second, and never does long work itself. A second
+Blender makes the maps of the world (`maps`). A thread makes the pictures (`viewer`).
+
+While the artist changes the world, the pictures are small. After a short rest the picture has full
+size. After a longer rest a relight starts: its plate has the world's lamps and is denoised.
 """
 
 from __future__ import annotations
@@ -40,9 +41,10 @@ from .viewer import Viewer, Wish
 
 IMAGE = "ARTO Live"
 EVERY = 1 / 30
-# Looked at without being told of a change: a world may be of another file.
+# Seconds after which the world is looked at even if Blender reported no change: it may
+# report none for a world that is linked from another file.
 ANYWAY = 0.5
-# Seconds of rest until a picture is made whole, and until it is finished by a relight.
+# Seconds of rest until a picture of full size is made, and until a relight is started.
 WHOLE, FINISHED = 0.25, 2.0
 
 
@@ -50,7 +52,10 @@ class Live:
     """A shot that follows its world."""
 
     def __init__(self, scene: bpy.types.Scene) -> None:
-        """Raises what opening the shot's field raises, SceneError for a world that is none."""
+        """Open the shot's field and start the Blender that makes maps.
+
+        Raises what opening the field raises, and SceneError where the scene has no usable world.
+        """
         self.scene_uid = scene.session_uid
         self.layer = layer_of(scene)
         self.name = name_of(scene)
@@ -63,10 +68,10 @@ class Live:
         self.viewer = Viewer(Preview(fields, holds_out(scene, self.layer)))
         self.maps = maps.Maps()
         self.shape = shown.field.shape
-        # outside a render region a picture is empty
+        # outside this render region a picture is empty
         self.region = shown.field.region
         self._shot = self._place(scene)
-        # what only the finished picture has
+        # what a live picture lacks and the relight adds, in words
         self.later = "its brightness" if shown.held else ""
         self.trouble = self.problem = ""
         self.line = "Starting"
@@ -86,7 +91,11 @@ class Live:
         return next((s for s in bpy.data.scenes if s.session_uid == self.scene_uid), None)
 
     def tick(self) -> bool:
-        """Look, wish, show; whether it goes on."""
+        """Look at the world, ask for a picture, show the newest one.
+
+        Returns False where the scene is gone: the timer then ends. Raises SceneError where the shot
+        was captured anew.
+        """
         scene = self.scene
         if scene is None:
             return False
@@ -119,7 +128,7 @@ class Live:
 
     @staticmethod
     def _place(scene: bpy.types.Scene) -> tuple[Any, ...]:
-        """What tells this shot from the scene's others."""
+        """What tells this shot from other shots of the scene: frame, camera and picture size."""
         camera = scene.camera.name if scene.camera else ""
         return scene.frame_current, scene.frame_subframe, camera, *picture_size(scene)
 
@@ -130,7 +139,7 @@ class Live:
             return False
 
     def _look(self, scene: bpy.types.Scene, now: float) -> None:
-        """What is to be shown now."""
+        """Note what the world is now, and when it last changed."""
         world = world_of(scene, self.layer)
         if world is None:
             raise SceneError("the scene has no world any more: add one, and switch Live on again")
@@ -140,7 +149,7 @@ class Live:
         if found != self._now:
             self._now, self._changed = found, now
             if self.relighting and session.current and session.current.verb == "relight":
-                session.cancel()  # of what is not wanted any more
+                session.cancel()  # the relight is of a light that is no longer wanted
             self.relighting = False
 
     def _wish(self, scene: bpy.types.Scene, now: float) -> None:
@@ -156,10 +165,10 @@ class Live:
                     self._asked_with = strength, turn
                 elif image is not None and full is None and rest > WHOLE:
                     self.maps.ask(scene, self.layer, world, key, True)
-        except SceneError as e:  # an HDRI is taken out before another is put in
+        except SceneError as e:  # between two HDRIs the world has none for a moment
             self.problem = str(e)
         if image is None:
-            # the hand is quicker than maps are made: the last one is nearer than none
+            # the artist changes the world faster than maps are made: show the newest map meanwhile
             newest = self.maps.newest
             if newest is None or self._wished[:1] == (newest[0],):
                 return
@@ -184,12 +193,12 @@ class Live:
 
     @property
     def settled(self) -> bool:
-        """Whether the whole picture of what the world is now is shown."""
+        """Whether the picture of full size, of the world as it is now, is shown."""
         wished = self._wished
         return wished[:-2] == self._now and wished[-1:] == (True,) and self.viewer.idle
 
     def _finish(self, scene: bpy.types.Scene) -> None:
-        """Start the relight that finishes what is shown, once."""
+        """Start the relight of the light that is shown, once for each light."""
         if self._finished == self._now or session.current or bpy.app.is_job_running("RENDER"):
             return
         self._finished = self._now
@@ -199,7 +208,7 @@ class Live:
         session.start("relight", scene, self.layer)
 
     def _is_finished(self, scene: bpy.types.Scene) -> bool:
-        """Whether the plate on disk is of this light and field already."""
+        """Whether the plate on disk is already of this light and this field."""
         try:
             path = paths.relit_file(scene)
             world = check_world(scene, self.layer)
@@ -216,8 +225,10 @@ class Live:
 def view_of(
     scene: bpy.types.Scene, shape: tuple[int, int], region: Region
 ) -> NDArray[np.float32] | None:
-    """The direction that each pixel of the scene's camera sees, (H, W, 3), 0 outside a region; None
-    for a panorama, whose pixels are not on a plane."""
+    """The direction that each pixel of the scene's camera sees, (H, W, 3), 0 outside the region.
+
+    None without a camera, and for a panorama, whose pixels do not lie on a plane.
+    """
     camera = scene.camera
     if camera is None or camera.type != "CAMERA" or camera.data.type == "PANO":
         return None
@@ -239,9 +250,11 @@ def view_of(
 
 
 def push(picture: NDArray[np.float32], name: str) -> bpy.types.Image:
-    """Put a picture (H, W, 4), rows top-down, into the live image, shown as the plate is."""
+    """Put a picture (H, W, 4), rows top-down, into the live image.
+
+    Editors that show the image called `name`, the plate, show the live image from now on.
+    """
     image = put(IMAGE, picture)
-    # where the plate is looked at, its light is now seen live
     for space in spaces():
         shown = space.image
         if shown is not None and shown != image and shown.name == name:
@@ -263,15 +276,15 @@ def redraw_pictures() -> None:
                 area.tag_redraw()
 
 
-# How a picture is brought before the artist; of the window.
+# Opens an image where the artist sees it. The window sets this function (`ui`).
 reveal: Callable[[bpy.types.Image], None] | None = None
 current: Live | None = None
-# Why it is off, where it went off by itself.
+# Why Live is off, where it ended by itself.
 trouble = ""
 
 
 def start(scene: bpy.types.Scene) -> None:
-    """Switch it on. Raises what `Live` raises."""
+    """Switch Live on for a scene. Raises what `Live` raises."""
     global current, trouble
     stop()
     trouble = ""
@@ -281,7 +294,7 @@ def start(scene: bpy.types.Scene) -> None:
 
 
 def stop() -> None:
-    """Switch it off; editors that showed it show the plate again."""
+    """Switch Live off. Editors that showed the live image show the plate again."""
     global current
     if current is None:
         return
@@ -291,8 +304,10 @@ def stop() -> None:
 
 
 def put_away(name: str, *others: str) -> None:
-    """Remove the live image, and others by their names: they are of no file. Editors that show them
-    show the plate of that name."""
+    """Remove the live image and other images, which are in no file.
+
+    name: the plate's, which editors show in their place; others: names of the other images.
+    """
     for image in filter(None, map(bpy.data.images.get, (IMAGE, *others))):
         for space in spaces():
             if space.image == image:
@@ -328,7 +343,7 @@ def _changed(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 @persistent
 def _undone(*_: object) -> None:
-    """An undo took the live image with it: it is made again, and shown."""
+    """Have the live image made and shown again: an undo removes it."""
     if current is not None:
         current.dirty, current.revealed, current._wished = True, False, ()
 
@@ -340,7 +355,7 @@ def _stop(*_: object) -> None:
 
 @persistent
 def _quitting(*_: object) -> None:
-    """End what is not of this process; of the file nothing matters any more."""
+    """End the second Blender and the thread. The open file is left alone: Blender is quitting."""
     global current
     if current is not None:
         ended, current = current, None
@@ -374,7 +389,7 @@ def unregister() -> None:
 
 
 def wrote(path: Path) -> bool:
-    """A relight has ended -> whether what it shows is what Live wants to be shown still."""
+    """A relight has ended -> whether to show its plate; not if Live wants a newer light by now."""
     if current is None or not current.relighting:
         return True
     current.relighting = False

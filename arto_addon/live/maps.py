@@ -1,7 +1,8 @@
-"""Maps of worlds, made by a Blender of their own, so that the window never waits for one.
+"""Maps of worlds, made by a second Blender, so that the window never waits for a map.
 
-The window saves the world into a small file, asks for a map, and has it a moment later. One
-question is on its way at a time; of those that wait, the newest wins.
+The window saves the world into a small file and sends a question to the second Blender. The map
+comes back a moment later. Only one question is on its way at a time. Questions do not queue: the
+window asks again for what it wants by then.
 """
 
 from __future__ import annotations
@@ -33,19 +34,24 @@ from ..world.bake import rough
 from ..world.check import check_world
 from ..world.dials import without_dials
 
-# What the answer to a question begins with, among what Blender prints.
+# How a line with an answer begins: Blender prints other lines too.
 ANSWER = "ARTO map "
-# Widths of a map that is made in a moment, and maps that stay in memory.
+# Width of a rough map, which takes a moment to make, and the number of maps kept in memory.
 ROUGH_WIDTH = 512
 MOST = 8
+# Seconds that the second Blender has to end by itself.
 _REAP = 2.0
 
 
 @dataclass(frozen=True)
 class Question:
-    """What the window asks for. blend: a file with the world in it; width: of a full map, 0 for a
-    rough one; painted: images in no file, by name, and where their pixels are; folder: where full
-    maps are kept; out: the .npy to write."""
+    """What the window asks the second Blender for.
+
+    blend: a file with the world in it; world: the world's name there; width: the width of a full
+    map, 0 for a rough map; space: the working colour space; painted: for each image that is in no
+    file, its name and the file with its pixels; folder: where full maps are kept; out: the .npy
+    file to write.
+    """
 
     blend: str
     world: str
@@ -60,10 +66,10 @@ class Question:
 
 
 class Maps:
-    """The window's side: maps by what they are of, and the Blender that makes them."""
+    """The maps that the window has, by the key of their world, and the second Blender."""
 
     def __init__(self) -> None:
-        """Raises SceneError where there is no room for its files."""
+        """Make a temporary folder. Raises SceneError where there is no room for it."""
         try:
             self._folder = Path(tempfile.mkdtemp(prefix="arto-live-"))
             marked.mark(self._folder, "maps")
@@ -72,7 +78,7 @@ class Maps:
         self._process: subprocess.Popen[str] | None = None
         self._found: OrderedDict[tuple[str, bool], NDArray[np.float32]] = OrderedDict()
         self._asked: tuple[str, bool] | None = None
-        # the last one that was made: what it is of, and it
+        # the map that was made last, after the key of its world
         self.newest: tuple[str, NDArray[np.float32]] | None = None
         self._lock = threading.Lock()
         self.trouble = ""
@@ -80,7 +86,7 @@ class Maps:
         self._failed: dict[tuple[str, bool], str] = {}
 
     def start(self) -> None:
-        """Start the Blender. Raises SceneError."""
+        """Start the second Blender. Raises SceneError where it cannot be started."""
         try:
             self._process = subprocess.Popen(
                 command(),
@@ -96,7 +102,7 @@ class Maps:
         threading.Thread(target=self._listen, args=(self._process,), daemon=True).start()
 
     def get(self, key: str, full: bool) -> NDArray[np.float32] | None:
-        """A map of strength 1 and no turn, (W / 2, W, 3), if it is there."""
+        """The map (W / 2, W, 3) of a world at strength 1, not turned; None if not yet made."""
         with self._lock:
             found = self._found.get((key, full))
             if found is not None:
@@ -104,7 +110,7 @@ class Maps:
             return found
 
     def trouble_with(self, key: str) -> str:
-        """Why no map of that can be made; empty where one was, or nobody has tried."""
+        """Why a map of this world could not be made; empty where none has failed."""
         with self._lock:
             return self._failed.get((key, False)) or self._failed.get((key, True)) or ""
 
@@ -115,9 +121,11 @@ class Maps:
     def ask(
         self, scene: bpy.types.Scene, layer: str, world: bpy.types.World, key: str, full: bool
     ) -> bool:
-        """Have a map made, if none is on its way -> whether it is now, or cannot be made.
+        """Ask for a map -> whether the question was sent.
 
-        Raises SceneError where the world cannot light anything.
+        No question is sent while another is on its way, for a map that has failed before, or where
+        the second Blender has just ended. Raises SceneError where the world cannot light anything
+        or cannot be written.
         """
         if self._asked or (key, full) in self._failed:
             return False
@@ -126,12 +134,12 @@ class Maps:
             self.start()
         process = self._process
         assert process and process.stdin
-        # another name each time: a Blender that has read a library knows it
+        # a new name each time: Blender does not read a library of a known name again
         self._number += 1
         blend = self._folder / f"world{self._number}.blend"
         painted = {}
-        # images are named by whole paths: the file lies elsewhere
-        written = world.copy() if world.library else world  # what is linked is in no other file
+        # absolute paths below: the small file lies in another folder than the artist's
+        written = world.copy() if world.library else world  # a linked world is not written
         name = written.name
         try:
             bpy.data.libraries.write(str(blend), {written}, path_remap="ABSOLUTE", fake_user=True)
@@ -160,7 +168,7 @@ class Maps:
             process.stdin.write(json.dumps(asdict(question)) + "\n")
             process.stdin.flush()
         except OSError:
-            self._asked = None  # it has ended: another one is started with the next question
+            self._asked = None  # that Blender has ended: the next question starts another
             return False
         return True
 
@@ -174,12 +182,13 @@ class Maps:
                     self._answered(found, said.get("error", ""))
                 except (OSError, ValueError, EOFError, KeyError) as e:
                     self._answered(None, f"the map of the world cannot be read ({e})")
-        # a world that ends it is not asked for again; what was asked of the next one is not its
+        # If a world makes the process end, the world counts as failed and is not tried again. If
+        # another process has been started since, the open question is for the new process.
         if process is self._process:
             self._answered(None, "the Blender that makes maps of the world ended: change the world")
 
     def _answered(self, found: NDArray[np.float32] | None, error: str) -> None:
-        """What was asked for has come, or never will."""
+        """Close the open question: keep its map, or why there is none."""
         with self._lock:
             asked, self._asked = self._asked, None
             if asked is None:
@@ -194,7 +203,7 @@ class Maps:
                 self._found.popitem(last=False)
 
     def close(self) -> None:
-        """End it, and remove its files."""
+        """End the second Blender and remove the temporary files."""
         if self._process:
             with contextlib.suppress(OSError):
                 assert self._process.stdin
@@ -207,13 +216,13 @@ class Maps:
 
 
 def images(world: bpy.types.World) -> list[bpy.types.Image]:
-    """The images of a world's nodes."""
+    """The images that a world's nodes use, groups included."""
     found = [n for t in trees(shader_tree(world), set()) for n in t.nodes]
     return [n.image for n in found if getattr(n, "image", None)]
 
 
 def command() -> list[str]:
-    """What starts the Blender that makes maps; of Blender as a module, a Python with it."""
+    """The command that starts the second Blender; a Python where Blender runs as a module."""
     if bpy.app.binary_path and not bpy.app.module:
         start = [bpy.app.binary_path, "-b", scripts.option(), "--addons", ADDON]
         return [*start, "--command", "arto", "maps"]
@@ -222,7 +231,7 @@ def command() -> list[str]:
 
 
 def serve() -> int:
-    """That Blender's side: answer questions until there are no more; the exit code."""
+    """Answer questions until the input ends, in the second Blender; returns the exit code."""
     for line in sys.stdin:
         try:
             said = {"map": _made(Question(**json.loads(line)))}
@@ -265,13 +274,15 @@ def _made(asked: Question) -> str:
     return asked.out
 
 
-# By what they are of: HDRIs brought to a size that Cycles has in a moment.
+# Names of reduced HDRIs, which Cycles loads in a moment, by what they were made from.
 _small: dict[tuple[object, ...], str] = {}
 
 
 def _reduced(image: bpy.types.Image) -> bpy.types.Image | None:
-    """An image of fewer pixels, each the mean of those that it covers; None for one that is small,
-    or that is more than one picture."""
+    """A smaller copy of an image, each pixel the mean of the pixels that it covers.
+
+    None where the image is small already, was painted on, or is not a single file.
+    """
     width, height = image.size
     scale = min(width // (2 * ROUGH_WIDTH), height // ROUGH_WIDTH)
     if image.source != "FILE" or scale < 2 or image.is_dirty:

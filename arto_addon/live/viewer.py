@@ -1,4 +1,4 @@
-"""The thread that works out live pictures: the newest wish wins, the others are never begun."""
+"""The thread that works out live pictures. A newer wish replaces one that was not begun."""
 
 from __future__ import annotations
 
@@ -16,15 +16,20 @@ from ...core.light.environment import Environment
 from ...core.light.light import PatchLight
 from ...core.preview import Preview
 
-# A picture for a moving hand takes no longer than this.
+# Seconds that a picture may take while the artist changes the world.
 MOVING = 0.06
 
 
 @dataclass(frozen=True, eq=False)
 class Wish:
-    """What to show. image: a map of strength 1 and no turn, see `maps`; own, gains: of the scene's
-    own lamps; resting: at full size, however long it takes; view: the directions of the pixels, for
-    the world behind, (h, w, 3), 0 where nothing is, None where it is not seen at all."""
+    """What to show.
+
+    image: a map of the world at strength 1, not turned (`maps`); strength, turn: applied to the
+    map; own: brightness of the scene's own lamps; gains: for each group of these lamps; resting:
+    whether the picture has full size, however long it takes; view: for the world behind the scene,
+    the direction of each pixel, (H, W, 3), 0 outside the render region, None where no world is seen
+    behind; at: when the picture was wished for, in seconds.
+    """
 
     image: NDArray[np.float32]
     strength: float
@@ -38,8 +43,11 @@ class Wish:
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A picture (h, w, 4), at 1 / factor of the size, rows top-down; what it is of, and how many
-    seconds after it was wished for it was there."""
+    """A picture that was worked out.
+
+    picture: (h, w, 4) at 1 / factor of the full size, rows top-down; latency: seconds from the wish
+    to the picture.
+    """
 
     wish: Wish
     picture: NDArray[np.float32]
@@ -63,20 +71,20 @@ class Viewer:
         self._thread.start()
 
     def wish(self, wish: Wish) -> None:
-        """Ask for a picture; what was asked for before and not begun is forgotten."""
+        """Ask for a picture. An earlier wish that was not begun is dropped."""
         with self._condition:
             self._wish = wish
             self._condition.notify()
 
     def take(self) -> Drawn | None:
-        """The newest picture that was not taken yet."""
+        """The newest picture; None where there is none since the last call."""
         with self._condition:
             shown, self._shown = self._shown, None
             return shown
 
     @property
     def idle(self) -> bool:
-        """Whether nothing is wished for or in the making, or waits to be taken."""
+        """Whether no picture is wished for, being made, or waiting to be taken."""
         with self._condition:
             return self._wish is None and self._shown is None and not self._busy
 
@@ -114,7 +122,7 @@ class Viewer:
 
 
 def show(preview: Preview, wish: Wish) -> Drawn:
-    """The picture that is wished for. Raises FieldError."""
+    """Work out the picture of a wish. Raises FieldError."""
     image, factor = wish.image, 1
     if not wish.resting:
         image, factor = _coarse(image), preview.factor_for(MOVING)
@@ -122,7 +130,7 @@ def show(preview: Preview, wish: Wish) -> Drawn:
     light = PatchLight(environment, preview.hemicube)
     picture = preview.picture(light, factor, wish.own, wish.gains)
     if wish.view is not None:
-        # the middle of each pixel of this size
+        # the direction in the middle of each of the larger pixels
         view = wish.view[factor // 2 :: factor, factor // 2 :: factor]
         view = view[: picture.shape[0], : picture.shape[1]]
         h, w = view.shape[:2]
@@ -132,13 +140,13 @@ def show(preview: Preview, wish: Wish) -> Drawn:
     return Drawn(wish, picture, factor, time.perf_counter() - wish.at)
 
 
-# The last map that was made coarser: a hand turns the same one.
+# The last map that was made coarser, and the result: while a world is turned its map is the same.
 _last: list[tuple[NDArray[np.float32], NDArray[np.float32]]] = []
 COARSE = 512
 
 
 def _coarse(image: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A map of no more than `COARSE` texels across, each the mean of those that it covers."""
+    """A map with blocks of texels averaged, about `COARSE` texels across where the sizes divide."""
     if _last and _last[0][0] is image:
         return _last[0][1]
     height, width = image.shape[:2]
