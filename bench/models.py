@@ -105,10 +105,10 @@ class Methods:
     def _add_field(self, name: str, field: Field, fine: bool = False) -> None:
         self.fields[name] = field
         self.ways[name] = lambda light, other: relight(field, other if fine else light)[..., :3]
-        read = field.about["read_seconds"]
+        read = field.about.read_seconds or 0.0
         self.costs[name] = {
             "bytes_per_pixel": field.bytes_per_pixel(),
-            "fit_seconds": field.about["fit_seconds"] - read,
+            "fit_seconds": (field.about.fit_seconds or 0.0) - read,
             "read_seconds": read,
         }
 

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.capture.tile_data import Around
+from arto.core.field.about import About
 from arto.core.field.field import OF_A_MODEL, Field
 from arto.core.field.tile_file import TileFile
 from arto.core.field.tile_writer import TileWriter
@@ -293,7 +294,9 @@ def sums(field: Field) -> list[Row]:
 def synthetic(size: Size, folder: Path) -> list[Row]:
     """Fit, field write and sum of images that were never on disk, strip by strip."""
     cube, patterns = _cube(size.patches), pattern_set("linear")
-    writer = FieldWriter(folder / "made", cube, (size.height, size.width), samples=size.samples)
+    writer = FieldWriter(
+        folder / "made", cube, (size.height, size.width), About(samples=size.samples)
+    )
     edges = [*range(0, size.height, STRIP), size.height]
     read = fitted = written = 0.0
     for number, (top, bottom) in enumerate(itertools.pairwise(edges)):

@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import FieldError
-from .field.tile import Model, Tile
+from .field.model import Model
+from .field.tile import Tile
 from .light.light import PatchLight
 
 # Bytes of entries that are unpacked at a time: a few patches of a block.

@@ -23,7 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .catcher import catch, held_out
-from .field.field import HEADER, Field, proxy_folder
+from .field.field import Field, proxy_folder
+from .field.head import HEADER
 from .field.merged import merged
 from .field.proxy import FACTORS
 from .hemicube import Hemicube

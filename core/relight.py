@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .field.field import Field
-from .field.tile import Model, Tile
+from .field.model import Model
+from .field.tile import Tile
 from .light.light import PatchLight
 from .lights import ROOM, Lights
 from .region import Region

@@ -13,7 +13,8 @@ from ...core.capture.capture_set import CaptureSet
 from ...core.capture.head import HEADER, CaptureHead
 from ...core.errors import ArtoError, CaptureSetError, FieldError
 from ...core.field.field import Field
-from ...core.field.writer import describe, write_head
+from ...core.field.head import FieldHead
+from ...core.field.writer import write_head
 from ...core.files import PART, replace_folder
 from ...core.fit.fit import about_of
 from .stream import Stream
@@ -86,22 +87,21 @@ def finish_field(unfinished: Path, folder: Path, head: CaptureHead) -> None:
     partial = unfinished / Stream.FIELD
     if not partial.exists():
         # a process that was killed has put it there already
-        if Field(folder).about.get("key") == head.key:
+        if Field(folder).about.key == head.key:
             return
         raise FieldError(
             f"the fitted tiles of {unfinished} are gone: discard it, and capture again"
         )
     captured = CaptureSet(unfinished)
-    fitted = [tile.fitted for tile in head.tiles]
-    if None in fitted:
+    fitted = [tile.fitted for tile in head.tiles if tile.fitted is not None]
+    if left := len(head.tiles) - len(fitted):
         raise FieldError(
-            f"{fitted.count(None)} of {len(fitted)} tiles of {unfinished} are not fitted: run "
+            f"{left} of {len(head.tiles)} tiles of {unfinished} are not fitted: run "
             "Capture again, it goes on from there"
         )
     about = about_of(captured, *head.told_choice)
-    described = describe(captured.hemicube, captured.shape, **about)
-    described["tiles"] = fitted
-    write_head(partial, described)
+    described = FieldHead(captured.hemicube, *captured.shape, about)
+    write_head(partial, described.with_tiles(fitted, partial))
     try:
         replace_folder(partial, folder)
     except OSError as e:

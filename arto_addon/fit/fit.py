@@ -24,7 +24,7 @@ def _is_fitted(captured: CaptureSet, folder: Path, choice: str, separate: bool) 
         about = Field(folder).about
     except FieldError:
         return False
-    then = about.get("key"), about.get("choice"), about.get("separate", False)
+    then = about.key, about.choice, bool(about.separate)
     return then[0] is not None and then == (captured.head.key, choice, separate)
 
 

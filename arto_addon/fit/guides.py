@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -27,7 +28,7 @@ def guides_of(field: Field) -> dict[str, NDArray]:
 def clean(field: Field) -> bool:
     """Whether a field's guides have next to no noise."""
     about = field.about
-    return about.get("guides") == CLEAN or about.get("samples", 0) >= CLEAN_SAMPLES
+    return about.guides == CLEAN or (about.samples or 0) >= CLEAN_SAMPLES
 
 
 # What a field says of guides that were denoised when it was written.
@@ -48,5 +49,4 @@ def cleaned(scene: bpy.types.Scene, folder: Path) -> Steps:
         noisy = ((pixels - low) / span).astype(np.float32)
         guides[name] = denoise.denoise({}, noisy, like=scene) * span + low
     replace_layers(field, guides)
-    field.head["about"]["guides"] = CLEAN
-    write_head(folder, field.head)
+    write_head(folder, replace(field.head, about=replace(field.about, guides=CLEAN)))

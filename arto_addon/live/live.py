@@ -61,7 +61,7 @@ class Live:
         self.name = name_of(scene)
         check_world(scene, self.layer)
         shown = Shown(scene, self.layer)
-        check_same_shot(scene, shown.field.about.get("shot"), "the reflectance field", self.layer)
+        check_same_shot(scene, shown.field.about.shot, "the reflectance field", self.layer)
         self.folder = shown.field.folder
         self.written = (self.folder / "field.json").stat().st_mtime_ns
         fields = [take.field for take in shown.takes]

@@ -67,7 +67,7 @@ def verify_plate(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps
                 f"{what} has {bad} pixels that are infinite or not a number, and cannot be compared"
             )
     yield Progress(0.95, "comparing")
-    samples = Field(paths.field_folder(scene, layer)).about.get("samples") or SAMPLES
+    samples = Field(paths.field_folder(scene, layer)).about.samples or SAMPLES
     ratio = 2 * SAMPLES / samples
     found = verify(there[..., :3], renders[0][..., :3], renders[1][..., :3], own=ratio)
     told = {"verify": said(scene, found), "samples": f"2 x {SAMPLES}"}

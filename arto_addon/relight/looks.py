@@ -96,7 +96,7 @@ def relight_looks(scene: bpy.types.Scene, view_layer: str) -> Steps:
         raise SceneError("there are no looks to relight: add one")
     scene.view_layers[view_layer].update()
     shown = Shown(scene, view_layer)
-    check_same_shot(scene, shown.field.about.get("shot"), "the reflectance field", view_layer)
+    check_same_shot(scene, shown.field.about.shot, "the reflectance field", view_layer)
     most = max(1, together(shown.field) // len(shown.takes))
     done = []
     for first in range(0, len(looks), most):

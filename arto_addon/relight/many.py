@@ -12,7 +12,7 @@ import bpy
 
 from ...core.errors import CaptureSetError, SceneError
 from ...core.relight import together
-from ...core.shot import Shot, safe_name
+from ...core.shot import safe_name
 from ..blender.nodes import new_world
 from ..capture.sequence import frame_kept
 from ..plate.present import present_frames
@@ -166,7 +166,7 @@ def _shown(scene: bpy.types.Scene, view_layer: str, still: Shown | None) -> Show
     folder = paths.field_folder(scene, view_layer)
     if folder.exists():
         found = Shown(scene, view_layer, folder)
-        check_same_shot(scene, found.field.about.get("shot"), "the reflectance field", view_layer)
+        check_same_shot(scene, found.field.about.shot, "the reflectance field", view_layer)
         return found
     now = shot_of(scene, view_layer)
     near = paths.nearest(scene, view_layer)
@@ -177,8 +177,7 @@ def _shown(scene: bpy.types.Scene, view_layer: str, still: Shown | None) -> Show
         with frame_kept(scene):
             scene.frame_set(near.frame)
             still = Shown(scene, view_layer, paths.field_folder(scene, view_layer))
-    then = still.field.about.get("shot")
-    was = Shot.from_json(then) if then else now
+    was = still.field.about.shot or now
     if difference := replace(was, frame=now.frame, subframe=now.subframe).difference(now):
         raise CaptureSetError(
             f"frame {now.frame} was not captured, and differs from frame {was.frame} by "

@@ -60,7 +60,7 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     scene.view_layers[layer].update()
     path = paths.relit_file(scene)
     shown = Shown(scene, layer)
-    check_same_shot(scene, shown.field.about.get("shot"), "the reflectance field", layer)
+    check_same_shot(scene, shown.field.about.shot, "the reflectance field", layer)
     seconds = yield from show(shown, Light(path, scene.arto.look))
     return path, seconds
 
@@ -204,9 +204,9 @@ def _lamps(shown: Shown, found: Split) -> Steps:
     settings, about = shown.scene.arto, shown.field.about
     if not settings.lamps or not found.worth:
         return [], "no", False
-    if not about.get("far", True):
+    if about.far is False:
         lamps = "no: lamps at infinity would not stand where a near hemicube has them"
-    elif "view_layer" not in about:
+    elif about.view_layer is None:
         lamps = "no: the field does not say of which view layer it is; capture again"
     else:
         samples = lamp_samples(shown.scene, found.share)

@@ -74,9 +74,9 @@ class Shown:
         self._changed: dict[tuple[int, float], list[str]] = {}
         self._split: tuple[NDArray[np.float32], Split] | None = None
         self._filmed: tuple[tuple[int, float], tuple[str, NDArray[np.float32]]] | None = None
-        self.held = self.field.about.get("route") == Route.SAMPLED
+        self.held = self.field.about.route == Route.SAMPLED
         self._others: list[Shown] = []
-        if self.field.about.get("catchers") and not self.field.about.get("take"):
+        if self.field.about.catchers and not self.field.about.take:
             self._others = [self._beside(folder.parent / name / "field") for name in takes.TAKES]
 
     @property
@@ -88,7 +88,7 @@ class Shown:
     def _beside(self, folder: Path) -> Shown:
         """Another take of the shot. Raises FieldError."""
         found = Shown(self.scene, self.layer, folder)
-        if found.field.about.get(takes.PAIR) != self.field.about.get("key"):
+        if found.field.about.pair != self.field.about.key:
             raise FieldError(
                 f"what is in {folder} was captured for another picture: run Capture again, it goes "
                 "on where it stopped"
@@ -107,7 +107,7 @@ class Shown:
         """What of the scene is not as it was captured, at its frame."""
         frame = self.scene.frame_current, self.scene.frame_subframe
         if frame not in self._changed:
-            then = self.field.about.get("fingerprint")
+            then = self.field.about.fingerprint
             found = changed_since(self.scene, self.layer, then, now=True)
             self._changed = {frame: found}
         return self._changed[frame]

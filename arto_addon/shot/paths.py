@@ -24,7 +24,7 @@ from ...core import marked
 from ...core.capture.head import HEADER as CAPTURE_HEADER
 from ...core.description import Description
 from ...core.errors import ArtoError, SceneError, ShotError
-from ...core.field.field import HEADER as FIELD_HEADER
+from ...core.field.head import HEADER as FIELD_HEADER
 from ...core.files import settle, write_text
 from ...core.regular import read_regular
 from ...core.shot import Shot, safe_name, short_hash

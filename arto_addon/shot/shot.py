@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import bpy
 
@@ -64,15 +63,13 @@ def _lens(scene: bpy.types.Scene) -> tuple[object, ...]:
     return kind, *(round(v, 5) if isinstance(v, float) else v for v in values)
 
 
-def check_same_shot(scene: bpy.types.Scene, then: Any, what: str, view_layer: str) -> None:
+def check_same_shot(scene: bpy.types.Scene, then: Shot | None, what: str, view_layer: str) -> None:
     """Raise CaptureSetError where `what` is of another shot than the scene's.
 
-    then: the description that it was written with, or that as a `Shot`. Raises ShotError for one
-    that is damaged.
+    then: the shot that it says it is of; None where it does not say.
     """
-    if not then:
+    if then is None:
         return
-    was = then if isinstance(then, Shot) else Shot.from_json(then)
-    difference = was.difference(shot_of(scene, view_layer))
+    difference = then.difference(shot_of(scene, view_layer))
     if difference:
         raise CaptureSetError(f"{what} is of {difference}: set it back, or capture and fit again")

@@ -12,8 +12,8 @@ import bpy
 from ...core.capture.capture_set import CaptureSet
 from ...core.capture.head import HEADER
 from ...core.errors import ArtoError
-from ...core.field import field
 from ...core.field.field import Field
+from ...core.field.head import HEADER as FIELD_HEADER
 from ...core.shot import Shot
 from . import paths, watch
 from .fingerprint import changes
@@ -123,7 +123,7 @@ def capture_at(header: Path) -> CaptureSet | None:
 def field_of(source: Path) -> Field | None:
     """The field in a shot's folder; None where it is not there, or damaged."""
     try:
-        return _opened(Field, source / "field" / field.HEADER)
+        return _opened(Field, source / "field" / FIELD_HEADER)
     except OSError:
         return None
 
@@ -146,7 +146,7 @@ def field_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line | 
     if place is None or place.owner:
         return None
     try:
-        path = place.source / "field" / field.HEADER
+        path = place.source / "field" / FIELD_HEADER
         there: Field | None = _opened(Field, path)
     except OSError:
         return None
@@ -154,18 +154,17 @@ def field_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line | 
         return "damaged, or of another version: fit again", False
     captured = _capture_set(place)  # which a field does not need any more
     if isinstance(captured, CaptureSet):
-        keys = there.about.get("key"), captured.head.key
+        keys = there.about.key, captured.head.key
         if keys[0] != keys[1]:
             return "of an earlier capture: fit again", False
-    text = f"{len(there.hemicube)} patches, {there.about.get('choice')}"
-    about = there.about
-    return _of_this_shot(scene, view_layer, about.get("shot"), about.get("fingerprint"), text)
+    text = f"{len(there.hemicube)} patches, {there.about.choice}"
+    return _of_this_shot(scene, view_layer, there.about.shot, there.about.fingerprint, text)
 
 
 def _of_this_shot(
     scene: bpy.types.Scene,
     view_layer: str | None,
-    shot: Any,
+    shot: Shot | None,
     then: Mapping[str, str] | None,
     text: str,
 ) -> Line:

@@ -26,8 +26,6 @@ WHOLE, GROUND, THINGS = Take.WHOLE, Take.GROUND, Take.THINGS
 # The takes after the first, in the order of capturing. The name of a take is also the name of its
 # folder in the shot's folder.
 TAKES = (GROUND, THINGS)
-# In the description of a field of such a take: the key of the first.
-PAIR = "pair"
 # The kinds of rays by which an object may be seen.
 _RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
 

@@ -9,7 +9,7 @@ import bpy
 from ...core import marked
 from ...core.capture.head import HEADER as CAPTURE_HEADER
 from ...core.errors import ArtoError, SceneError
-from ...core.field.field import HEADER as FIELD_HEADER
+from ...core.field.head import HEADER as FIELD_HEADER
 from ...core.files import Lock
 from ..capture import planes
 from ..capture.capture import capture

@@ -11,7 +11,7 @@ import bpy
 
 from ...core.capture.head import HEADER
 from ...core.errors import ArtoError
-from ...core.field import field
+from ...core.field.head import HEADER as FIELD_HEADER
 from ...core.shot import Shot
 from ...core.units import clock, size
 from ..capture.planned import most
@@ -79,9 +79,10 @@ def told(scene: bpy.types.Scene) -> Told:
             return Told("elsewhere", (text, *more), "Continue" if more else "Capture Again")
         text = text[0].upper() + text[1:]
         return Told("changed", (text, *more), "Continue" if more else "Capture Again")
-    about = status.field_of(place.source)
-    when = _when(place.source / "field" / field.HEADER)
-    samples = about.about.get("samples", "?") if about else "?"
+    there = status.field_of(place.source)
+    when = _when(place.source / "field" / FIELD_HEADER)
+    known = there.about.samples if there else None
+    samples = "?" if known is None else known
     text = tr("Ready, captured {when}, {samples} samples", when=when, samples=samples)
     return Told("ready", (text, *more), "Continue" if more else "Capture Again")
 
@@ -106,10 +107,7 @@ def _elsewhere(then: Shot, now: Shot) -> str:
 
 def _shot(source: Path) -> Shot | None:
     there = status.field_of(source)
-    try:
-        return Shot.from_json(there.about.get("shot")) if there else None
-    except ArtoError:
-        return None
+    return there.about.shot if there else None
 
 
 def captured_shot(scene: bpy.types.Scene) -> Shot | None:

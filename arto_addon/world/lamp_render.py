@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.errors import SceneError
+from ...core.errors import FieldError, SceneError
 from ...core.field.field import Field
 from ...core.light.environment import Environment
 from ..blender.colour import working_space
@@ -103,9 +103,14 @@ def _lit_by(
 ) -> Iterator[tuple[Stage, str]]:
     """A stage of a field's picture with a map as its world, and the light group of that."""
     with ExitStack() as held:
-        on = held.enter_context(stage(scene, field.about["view_layer"]))
-        if field.about.get("catchers"):
-            held.enter_context(take(rendered(on), field.about.get("take", WHOLE)))
+        about = field.about
+        if about.view_layer is None:
+            raise FieldError(
+                f"{field.folder} does not say of which view layer it is: capture again"
+            )
+        on = held.enter_context(stage(scene, about.view_layer))
+        if about.catchers:
+            held.enter_context(take(rendered(on), about.take or WHOLE))
         # whatever the artist looks at meanwhile: the field is Cycles'
         on.change("render.engine", "CYCLES")
         prepare(on, layers=0)

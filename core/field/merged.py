@@ -3,6 +3,23 @@
 A field on disk is in tiles, as it was captured, and each patch of each tile is a step of its own:
 of a proxy these are thousands of steps of a few pixels. Here the tiles stand together in as many
 blocks as there are threads.
+
+>>> import tempfile
+>>> from pathlib import Path
+>>> from arto.core.hemicube import Hemicube
+>>> from arto.core.field.tile_writer import TileWriter
+>>> from arto.core.field.writer import FieldWriter
+>>> with tempfile.TemporaryDirectory() as folder:
+...     writer = FieldWriter(Path(folder) / "field", Hemicube(patches=1), (8, 4))
+...     for y in (0, 4):
+...         tile = TileWriter(Region(0, y, 4, 4), {})
+...         for _ in range(6):
+...             tile.add(np.ones(16, np.uint8), np.ones((16, 3)), {1: np.empty((16, 0))})
+...         writer.add(tile)
+...     writer.close()
+...     field = Field(writer.folder)
+...     print(len(field.tiles), len(merged(field).tiles))
+2 1
 """
 
 from __future__ import annotations
@@ -16,7 +33,8 @@ from numpy.typing import NDArray
 from ..region import Region
 from ..supports import Support
 from .field import Field
-from .tile import Model, Tile
+from .model import Model
+from .tile import Tile
 
 # Blocks: threads that add up, on the machines that artists have at the least.
 BLOCKS = 2
@@ -34,7 +52,17 @@ class _Entries:
 
 
 class MergedModel:
-    """The entries of one support model, as `tile.Model` has them."""
+    """The entries of one support model, as `tile.Model` has them.
+
+    Parameters
+    ----------
+    support : Support
+        The model.
+    found : list of list
+        By block and patch, its entries; None where there are none.
+    like : Model
+        That of one of the tiles.
+    """
 
     def __init__(self, support: Support, found: list[list[_Entries | None]], like: Model) -> None:
         self.path, self.support, self.end = like.path, support, like.end
@@ -50,22 +78,63 @@ class MergedModel:
         self.starts = (ends - self.counts.ravel()).reshape(self.counts.shape)
 
     def at(self, block: int, k: int) -> slice:
+        """As `Model.at`.
+
+        Parameters
+        ----------
+        block, k : int
+
+        Returns
+        -------
+        slice
+        """
         a = int(self.starts[block, k])
         return slice(a, a + int(self.counts[block, k]))
 
     def pixels(self, block: int, k: int) -> NDArray[np.int32]:
+        """As `Model.pixels`.
+
+        Parameters
+        ----------
+        block, k : int
+
+        Returns
+        -------
+        (n,) int32
+        """
         found = self._pixels[block][k]
         assert found is not None
         return found
 
     def parameters_of(self, at: slice) -> NDArray[np.float32]:
+        """As `Model.parameters_of`.
+
+        Parameters
+        ----------
+        at : slice
+
+        Returns
+        -------
+        (n, p) float32
+        """
         out = self.parameters[:, at].astype(np.float32)
         out /= self.end
         return out.T
 
 
 class MergedTile:
-    """All of a field, as `tile.Tile` has a part of it."""
+    """All of a field, as `tile.Tile` has a part of it.
+
+    Parameters
+    ----------
+    tiles : list of Tile
+        That stand below each other, from the top.
+
+    Raises
+    ------
+    FieldError
+        If one is damaged.
+    """
 
     def __init__(self, tiles: list[Tile]) -> None:
         first = tiles[0].region
@@ -125,27 +194,79 @@ class MergedTile:
         return out
 
     def ones(self, pixels: slice) -> NDArray[np.float32]:
+        """As `Tile.ones`.
+
+        Parameters
+        ----------
+        pixels : slice
+
+        Returns
+        -------
+        (n, 3) float32
+        """
         return self._ones[pixels]
 
     def rest(self, pixels: slice = slice(None)) -> NDArray[np.float32]:
+        """As `Tile.rest`.
+
+        Parameters
+        ----------
+        pixels : slice
+
+        Returns
+        -------
+        (n, 3) float32
+        """
         return self._rest[pixels]
 
     def layer(
         self, name: str, part: tuple[slice, slice] = (slice(None), slice(None))
     ) -> NDArray[np.float32]:
+        """As `Tile.layer`, and kept.
+
+        Parameters
+        ----------
+        name : str
+        part : tuple of slice
+
+        Returns
+        -------
+        (h, w) or (h, w, 3) float32
+
+        Raises
+        ------
+        FieldError
+            If a tile has none.
+        """
         if name not in self._layers:
             self._layers[name] = np.concatenate([t.layer(name) for t in self._tiles])
             self.close()
         return self._layers[name][part]
 
     def has_layer(self, name: str) -> bool:
+        """Whether every tile has a layer.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        bool
+        """
         return name in self._names
 
     def own_layers(self) -> list[str]:
+        """Layers of light groups of the scene's own lamps that every tile has.
+
+        Returns
+        -------
+        list of str
+        """
         return [name for name in self._names if name.startswith("own_")]
 
     def open(self) -> None:
-        """It is."""
+        """Do nothing: all that relighting needs is in memory."""
 
     def close(self) -> None:
         """Let go of the files of the tiles."""
@@ -164,7 +285,22 @@ def _joined(parts: list[_Entries]) -> _Entries | None:
 
 
 def merged(field: Field) -> Field:
-    """The field, its tiles in one piece where they stand below each other and are small enough."""
+    """The field, its tiles in one piece where they stand below each other and are small enough.
+
+    Parameters
+    ----------
+    field : Field
+
+    Returns
+    -------
+    Field
+        Another one; the field itself where its tiles stay as they are.
+
+    Raises
+    ------
+    FieldError
+        If a tile is damaged.
+    """
     tiles = sorted(field.tiles, key=lambda t: t.region.y)
     first = tiles[0].region
     below = first.y

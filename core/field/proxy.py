@@ -3,6 +3,12 @@
 A pixel of a proxy is the mean of those that it covers. Coefficients and moments add up, so where
 supports are moments its picture is the mean of the picture's pixels, exactly; of boxes, what covers
 them all is kept where most of the light is theirs. A field of other models has none.
+
+>>> tile = TileWriter(Region(0, 0, 8, 8), {})
+>>> light = np.ones((64, 3))
+>>> tile.add(np.full(64, WHOLE.code, np.uint8), light, {WHOLE.code: np.empty((64, 0))})
+>>> {f: small.region.pixels for f, small in proxies(tile, Hemicube(patches=1)).items()}
+{2: 16, 4: 4, 8: 1}
 """
 
 from __future__ import annotations
@@ -21,10 +27,22 @@ FACTORS = (2, 4, 8)
 
 
 def proxies(tile: TileWriter, hemicube: Hemicube, first: bool = True) -> dict[int, TileWriter]:
-    """The proxies of a tile, by how many pixels a side one of theirs covers.
+    """The proxies of a tile.
 
-    first: whether the tile is the topmost; another one must begin with a pixel of the proxy, which
-    no two tiles can share.
+    Parameters
+    ----------
+    tile : TileWriter
+        What was fitted.
+    hemicube : Hemicube
+        Its patches.
+    first : bool
+        Whether the tile is the topmost. Another one must begin with a pixel of the proxy, which no
+        two tiles can share.
+
+    Returns
+    -------
+    dict of int to TileWriter
+        By how many pixels a side one pixel of the proxy covers.
     """
     found: dict[int, TileWriter] = {}
     if not set(tile.models) <= {WHOLE.code, LINEAR.code, BOX.code}:

@@ -2,12 +2,14 @@
 
 A coefficient is stored in eight bits as the root of its share of the pixel's largest: its error is
 then in proportion to the root of the light, as the noise of any capture is, and under a thirtieth
-of it at 128 samples a pixel. Whose entry it is, is a bit for each pixel, patch and model in use.
+of it at 128 samples a pixel. A bit for each pixel, patch and model in use says who has an entry.
+
+>>> [(b.start, b.stop) for b in blocks_of(200_000)]
+[(0, 131072), (131072, 200000)]
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -16,7 +18,8 @@ from numpy.typing import NDArray
 
 from ..errors import FieldError
 from ..region import Region
-from ..supports import BY_CODE, NOTHING, REST, Support
+from ..supports import BY_CODE, NOTHING, REST
+from .model import Entries, Model
 from .tile_file import TileFile
 from .tile_folder import TileFolder
 
@@ -34,92 +37,20 @@ SUFFIX = ".arto"
 OTHERS = ("peaks", "scales", "rest", "rest_weights", "rest_patches")
 
 
-@dataclass(frozen=True)
-class Entries:
-    """The entries of one patch that share a support model.
-
-    pixels: (n,) indices into the tile, row by row; coefficient: (n, 3) R; parameters: (n, p).
-    """
-
-    support: Support
-    pixels: NDArray[np.intp]
-    coefficient: NDArray[np.float32]
-    parameters: NDArray[np.float32]
-
-
 def blocks_of(pixels: int) -> list[slice]:
-    """The blocks of a tile."""
-    return [slice(a, min(a + BLOCK, pixels)) for a in range(0, pixels, BLOCK)]
+    """The blocks of a tile.
 
+    Parameters
+    ----------
+    pixels : int
+        How many the tile has.
 
-def steps_of(support: Support) -> np.dtype:
-    """How finely a model's parameters are stored: means of many paths in 8 bits, edges in 16."""
-    return np.dtype(np.uint8 if support.name == "linear" else np.uint16)
-
-
-class Model:
-    """The entries of one support model in a tile: (3, m) codes of R, (p, m) parameters.
-
-    They stand in the order of (block, patch, pixel); counts: (B, K) of them; bits: for each block
-    and patch that has any, a bit for each pixel of the block.
+    Returns
+    -------
+    list of slice
+        Of its pixels, in order.
     """
-
-    def __init__(self, tile: Tile, support: Support, count: int) -> None:
-        # not the tile itself: it has its models, and a circle would keep its file mapped
-        self.path, self.blocks, self.support = tile.path, tile.blocks, support
-        name, p = support.name, len(support.parameters)
-        blocks = tile.blocks
-        counts = tile.load(f"{name}_counts", (len(blocks), tile.patches), np.uint32)
-        lengths = np.array([b.stop - b.start for b in blocks])[:, None]
-        if (counts > lengths).any() or counts.sum(dtype=np.int64) != count:
-            raise FieldError(f"{tile.path} is damaged, its counts differ: fit again")
-        self.counts = counts
-        self.starts = _starts(counts)
-        row = np.where(counts > 0, -(-lengths // 8), 0)
-        self.rows = _starts(row)
-        self.codes = tile.load(f"{name}_coefficient", (3, count), np.uint8)
-        self.parameters = tile.load(f"{name}_parameters", (p, count), steps_of(support))
-        self.bits = tile.load(f"{name}_pixels", (int(row.sum()),), np.uint8)
-        # parameters are in [0, 1], of which this is the end
-        self.end = np.float32(np.iinfo(self.parameters.dtype).max)
-
-    def has(self, block: int, k: int) -> bool:
-        return bool(self.counts[block, k])
-
-    def at(self, block: int, k: int) -> slice:
-        """The columns of `codes` and `parameters` of patch k in a block."""
-        a = self.starts[block, k]
-        return slice(a, a + int(self.counts[block, k]))
-
-    def pixels(self, block: int, k: int) -> NDArray[np.intp]:
-        """Their pixels, counted from the block's first."""
-        where = self.blocks[block]
-        n = where.stop - where.start
-        first = self.rows[block, k]
-        found = np.flatnonzero(
-            np.unpackbits(self.bits[first : first + -(-n // 8)], count=n).view(bool)
-        )
-        if len(found) != self.counts[block, k]:
-            raise FieldError(f"{self.path} is damaged, its counts differ: fit again")
-        return found
-
-    def shares(self, at: slice) -> NDArray[np.float32]:
-        """(3, n) of R, relative to that whose code is 1."""
-        out = self.codes[:, at].astype(np.float32)
-        out *= out
-        return out
-
-    def parameters_of(self, at: slice) -> NDArray[np.float32]:
-        """(n, p) in [0, 1]."""
-        out = self.parameters[:, at].astype(np.float32)
-        out /= self.end
-        return out.T
-
-
-def _starts(sizes: NDArray) -> NDArray[np.int64]:
-    """Where each of some runs begins, that stand in the order of (block, patch)."""
-    ends = np.cumsum(sizes, dtype=np.int64)
-    return (ends - sizes.ravel()).reshape(sizes.shape)
+    return [slice(a, min(a + BLOCK, pixels)) for a in range(0, pixels, BLOCK)]
 
 
 class Tile:
@@ -127,13 +58,13 @@ class Tile:
 
     Parameters
     ----------
-    path
+    path : Path
         Its file; of a field of version 2, its folder.
-    region
+    region : Region
         Its place in the picture.
-    used
+    used : dict of str to int
         By the name of each support model in use, how many entries it has.
-    patches
+    patches : int
         Those of the hemicube, K.
     """
 
@@ -155,7 +86,26 @@ class Tile:
                 self.__dict__.pop(name, None)
 
     def load(self, name: str, shape: tuple[int, ...], dtype: np.dtype | type) -> NDArray:
-        """One of the tile's arrays, mapped. Raises FieldError unless it is as described."""
+        """One of the tile's arrays.
+
+        Parameters
+        ----------
+        name : str
+        shape : tuple of int
+            That it must have.
+        dtype : dtype
+            That it must have.
+
+        Returns
+        -------
+        array
+            Mapped, and read only.
+
+        Raises
+        ------
+        FieldError
+            If it is missing, or not as it must be.
+        """
         out = self._arrays.load(name)
         if out.shape != shape or out.dtype != dtype:
             raise FieldError(
@@ -167,7 +117,24 @@ class Tile:
     def layer(
         self, name: str, part: tuple[slice, slice] = (slice(None), slice(None))
     ) -> NDArray[np.float32]:
-        """One of `field.LAYERS`, (h, w, ...), float32; part: of its rows and columns."""
+        """One of `field.LAYERS`, or a layer of a light group.
+
+        Parameters
+        ----------
+        name : str
+        part : tuple of slice
+            Rows and columns that are read.
+
+        Returns
+        -------
+        (h, w) or (h, w, 3) float32
+            Light scene-linear, in the field's colour space.
+
+        Raises
+        ------
+        FieldError
+            If it is missing, or has the wrong size.
+        """
         out = self._arrays.load(name)
         if out.shape[:2] != (self.region.height, self.region.width):
             raise FieldError(f"{self.path} is damaged, '{name}' has the wrong size: fit again")
@@ -179,11 +146,36 @@ class Tile:
         return self._arrays.sizes
 
     def has_layer(self, name: str) -> bool:
-        """Whether it has a layer of that name. Raises FieldError."""
+        """Whether it has a layer.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        bool
+
+        Raises
+        ------
+        FieldError
+            If the file is missing or damaged.
+        """
         return name in self.sizes
 
     def own_layers(self) -> list[str]:
-        """Its layers of light groups of the scene's own lamps. Raises FieldError."""
+        """Its layers of light groups of the scene's own lamps.
+
+        Returns
+        -------
+        list of str
+            Their names.
+
+        Raises
+        ------
+        FieldError
+            If the file is missing or damaged.
+        """
         return [name for name in self.sizes if name.startswith("own_")]
 
     @cached_property
@@ -209,7 +201,22 @@ class Tile:
         return self.load("peaks", (self.region.pixels, 3), np.float16)
 
     def ones(self, pixels: slice | NDArray[np.intp]) -> NDArray[np.float32]:
-        """(n, 3): the R whose code is 1 in each pixel."""
+        """The R whose code is 1 in each pixel.
+
+        Parameters
+        ----------
+        pixels : slice or (n,) int
+            Of the tile.
+
+        Returns
+        -------
+        (n, 3) float32
+
+        Raises
+        ------
+        FieldError
+            If the array is missing or damaged.
+        """
         out = self._peaks[pixels].astype(np.float32) * (self._scales[0] / FULL**2)
         return self._numbers("peaks", out)
 
@@ -233,7 +240,22 @@ class Tile:
         return self.load("rest", (self.region.pixels, 3), np.float16)
 
     def rest(self, pixels: slice = slice(None)) -> NDArray[np.float32]:
-        """(n, 3): R of all that was too small to be an entry, added up."""
+        """R of all that was too small to be an entry, added up.
+
+        Parameters
+        ----------
+        pixels : slice
+            Of the tile.
+
+        Returns
+        -------
+        (n, 3) float32
+
+        Raises
+        ------
+        FieldError
+            If the array is missing or damaged.
+        """
         out = self._rest[pixels].astype(np.float32) * self._scales[1]
         return self._numbers("rest", out)
 
@@ -243,7 +265,13 @@ class Tile:
         return self.load("rest_patches", (-(-self.patches // 8), self.region.pixels), np.uint8)
 
     def open(self) -> None:
-        """Map all that relighting needs. Raises FieldError."""
+        """Map all that relighting needs.
+
+        Raises
+        ------
+        FieldError
+            If an array is missing or damaged.
+        """
         _ = self.models, self._scales, self._peaks
         if self.rest_weights is not None:
             _ = self._rest, self.rest_patches
@@ -262,7 +290,22 @@ class Tile:
         return out
 
     def entries(self, k: int) -> list[Entries]:
-        """The entries of patch k, model by model."""
+        """The entries of a patch, model by model.
+
+        Parameters
+        ----------
+        k : int
+            The patch.
+
+        Returns
+        -------
+        list of Entries
+
+        Raises
+        ------
+        FieldError
+            If an array is missing or damaged.
+        """
         found = []
         for model in self.models:
             here = [b for b in range(len(self.blocks)) if model.has(b, k)]

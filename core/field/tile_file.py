@@ -55,8 +55,20 @@ _STEP = 1 << 24
 class Stored:
     """An array in the file of a tile.
 
-    type: one of `TYPES`, little endian; offset: of its first byte in the file; bytes: how many it
-    has; crc32: the checksum of these, as in zlib.
+    Parameters
+    ----------
+    name : str
+        What it is found by.
+    type : str
+        One of `TYPES`; in the file little endian.
+    shape : tuple of int
+        Its sides.
+    offset : int
+        Where its first byte is in the file.
+    bytes : int
+        How many it has.
+    crc32 : int
+        The checksum of these, as in zlib.
     """
 
     name: str
@@ -68,6 +80,7 @@ class Stored:
 
     @property
     def dtype(self) -> np.dtype:
+        """The type of its numbers, as numpy has it."""
         return np.dtype(TYPES[self.type]).newbyteorder("<")
 
 
@@ -78,7 +91,7 @@ class TileFile:
 
     Parameters
     ----------
-    path
+    path : Path
         The file.
 
     Raises
@@ -99,7 +112,22 @@ class TileFile:
         return {name: stored.bytes for name, stored in self.index.items()}
 
     def load(self, name: str) -> NDArray:
-        """One of its arrays, mapped and read only. Raises FieldError where there is none."""
+        """One of its arrays.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        array
+            Mapped, and read only.
+
+        Raises
+        ------
+        FieldError
+            If there is none of that name.
+        """
         stored = self.index.get(name)
         if stored is None:
             raise FieldError(f"{self.path} lacks '{name}': fit again")
@@ -107,7 +135,13 @@ class TileFile:
 
 
 class TileFileWriter:
-    """Writes the file of a tile, array after array; see `written`."""
+    """Writes the file of a tile, array after array; see `written`.
+
+    Parameters
+    ----------
+    file : BinaryIO
+        Open to be written, and empty.
+    """
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
@@ -115,7 +149,20 @@ class TileFileWriter:
         file.write(bytes(ALIGNED))
 
     def add(self, name: str, array: NDArray) -> None:
-        """Write an array of one of `TYPES` under a name. Raises OSError."""
+        """Write an array.
+
+        Parameters
+        ----------
+        name : str
+            What it will be found by.
+        array : array
+            Of one of `TYPES`.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written.
+        """
         kind = f"{array.dtype.kind}{array.dtype.itemsize}"
         # little endian on every machine, row by row
         array = np.ascontiguousarray(array, np.dtype(TYPES[kind]).newbyteorder("<"))
@@ -126,8 +173,24 @@ class TileFileWriter:
         self._stored.append(Stored(name, kind, array.shape, offset, *size))
 
     def copy(self, stored: Stored, source: BinaryIO, path: Path) -> None:
-        """Write an array as it is in another tile's file. Raises FieldError where its checksum is
-        not that of its bytes, OSError."""
+        """Write an array as it is in another tile's file.
+
+        Parameters
+        ----------
+        stored : Stored
+            The array.
+        source : BinaryIO
+            The file that has it, open.
+        path : Path
+            Of that file, for messages.
+
+        Raises
+        ------
+        FieldError
+            If its checksum is not that of its bytes.
+        OSError
+            If it cannot be read or written.
+        """
         offset, found, left = self._aligned(), 0, stored.bytes
         source.seek(stored.offset)
         while left and (data := source.read(min(left, _STEP))):
@@ -139,7 +202,13 @@ class TileFileWriter:
         self._stored.append(Stored(stored.name, stored.type, stored.shape, offset, *kept))
 
     def close(self) -> None:
-        """Write the index, then the head: with it the file is one. Raises OSError."""
+        """Write the index, then the head: with it the file is one.
+
+        Raises
+        ------
+        OSError
+            If they cannot be written.
+        """
         index = json.dumps([asdict(s) for s in self._stored]).encode()
         offset = self._aligned()
         self._file.write(index)
@@ -160,7 +229,7 @@ def written(path: Path) -> Iterator[TileFileWriter]:
 
     Parameters
     ----------
-    path
+    path : Path
         The file; folders above it are made.
 
     Yields
@@ -184,9 +253,9 @@ def rewrite(path: Path, arrays: dict[str, NDArray]) -> None:
 
     Parameters
     ----------
-    path
+    path : Path
         The file. Nothing may have it mapped: Windows does not replace such a file.
-    arrays
+    arrays : dict of str to array
         By their names.
 
     Raises

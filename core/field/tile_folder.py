@@ -3,6 +3,13 @@
 Of captures whose basis images were not kept there is nothing to fit again, so fields of version 2
 are read as they are. A capture that was stopped in that version goes on in this one, and its field
 has tiles of both kinds.
+
+>>> import tempfile
+>>> with tempfile.TemporaryDirectory() as folder:
+...     rewrite_folder(Path(folder), {"scales": np.array([1, 0.5], np.float32)})
+...     found = TileFolder(Path(folder))
+...     print(list(found.sizes), found.load("scales").tolist())
+['scales'] [1.0, 0.5]
 """
 
 from __future__ import annotations
@@ -20,7 +27,13 @@ from ..regular import open_regular
 
 
 class TileFolder:
-    """The arrays of a tile in a folder, each mapped when it is asked for. As `TileFile`."""
+    """The arrays of a tile in a folder, each mapped when it is asked for. As `TileFile`.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -31,7 +44,22 @@ class TileFolder:
         return {p.stem: p.stat().st_size for p in self.path.glob("*.npy") if p.is_file()}
 
     def load(self, name: str) -> NDArray:
-        """One of its arrays, mapped and read only. Raises FieldError where there is none."""
+        """One of its arrays.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        array
+            Mapped, and read only.
+
+        Raises
+        ------
+        FieldError
+            If there is none of that name, or it is damaged.
+        """
         path = self.path / f"{name}.npy"
         try:
             with open_regular(path) as file:
@@ -47,7 +75,20 @@ class TileFolder:
 
 
 def rewrite_folder(path: Path, arrays: dict[str, NDArray]) -> None:
-    """Put arrays into the folder of a tile, each whole or not at all. Raises OSError."""
+    """Put arrays into the folder of a tile, each whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+    arrays : dict of str to array
+        By their names.
+
+    Raises
+    ------
+    OSError
+        If one cannot be written.
+    """
     for name, array in arrays.items():
         with whole(path / f"{name}.npy") as partial, partial.open("wb") as file:
             np.save(file, array)

@@ -1,4 +1,11 @@
-"""One tile of a reflectance field in the making: entries patch after patch, written at the end."""
+"""One tile of a reflectance field in the making: entries patch after patch, written at the end.
+
+>>> tile = TileWriter(Region(0, 0, 2, 1), {})
+>>> light = np.array([[0.5, 0.5, 0.5], [0, 0, 0]])
+>>> tile.add(np.array([1, 0], np.uint8), light, {1: np.empty((1, 0))})
+>>> tile.patches, tile.peaks[0].tolist()
+(1, [0.5, 0.0])
+"""
 
 from __future__ import annotations
 
@@ -11,12 +18,21 @@ from ..capture.names import OF_ONE_RAY
 from ..errors import FieldError
 from ..region import Region
 from ..supports import BY_CODE, NOTHING
-from .tile import FULL, LARGEST, blocks_of, steps_of
+from .model import steps_of
+from .tile import FULL, LARGEST, blocks_of
 from .tile_file import TileFileWriter
 
 
 class TileWriter:
-    """Collects one tile's entries, patch after patch, and writes them at the end."""
+    """Collects one tile's entries, patch after patch, and writes them at the end.
+
+    Parameters
+    ----------
+    region : Region
+        The tile's place in the picture.
+    layers : dict of str to array
+        By their names, (h, w) or (h, w, 3) of the region, see `field.LAYERS`.
+    """
 
     def __init__(self, region: Region, layers: dict[str, NDArray]) -> None:
         self.region = region
@@ -32,11 +48,24 @@ class TileWriter:
         self.rest_bits: list[NDArray[np.uint8]] = []
 
     def add(self, codes: NDArray, coefficient: NDArray, parameters: dict[int, NDArray]) -> None:
-        """The next patch: model code (n,), R (n, 3), and each used code's parameters (m, p).
+        """Add the next patch.
 
         Light without an entry is added to the pixel's rest. A coefficient below 0, which only
-        patterns that do not fit together can give, is no light. Raises FieldError for one that is
-        no number.
+        patterns that do not fit together can give, is no light.
+
+        Parameters
+        ----------
+        codes : (n,) uint8
+            Which model each pixel's entry has; `NOTHING` for no entry.
+        coefficient : (n, 3) float
+            R, scene-linear.
+        parameters : dict of int to (m, p) float
+            By the code of each model in use, its entries' parameters, in [0, 1].
+
+        Raises
+        ------
+        FieldError
+            If a coefficient is infinite or no number, saying where.
         """
         low, high = coefficient.min(initial=0), coefficient.max(initial=0)
         if not (low > -np.inf and high < np.inf):  # which NaN fails too
@@ -54,7 +83,15 @@ class TileWriter:
         self.patches += 1
 
     def add_rest(self, pixels: NDArray[np.intp], coefficient: NDArray) -> None:
-        """What is too small to be an entry, of the patch that is being added."""
+        """Add what is too small to be an entry, of the patch that is being added.
+
+        Parameters
+        ----------
+        pixels : (m,) int
+            Whose it is.
+        coefficient : (m, 3) float
+            R, scene-linear.
+        """
         self.rest[pixels] += coefficient
         self.rest_of.append(float(coefficient.sum(dtype=np.float64)))
         byte, bit = divmod(self.patches, 8)
@@ -65,9 +102,18 @@ class TileWriter:
     def add_entries(
         self, code: int, pixels: NDArray[np.intp], coefficient: NDArray, parameters: NDArray
     ) -> None:
-        """The entries of one model, of the patch that is being added.
+        """Add the entries of one model, of the patch that is being added.
 
-        coefficient: R (3, m); parameters: (p, m).
+        Parameters
+        ----------
+        code : int
+            Of the model.
+        pixels : (m,) int
+            Whose they are.
+        coefficient : (3, m) float
+            R, scene-linear.
+        parameters : (p, m) float
+            In [0, 1].
         """
         if not len(pixels):
             return
@@ -89,7 +135,23 @@ class TileWriter:
         )
 
     def write(self, out: TileFileWriter) -> dict[str, int]:
-        """Write the arrays; returns how many entries each model took. Raises OSError."""
+        """Write the arrays.
+
+        Parameters
+        ----------
+        out : TileFileWriter
+            What takes them.
+
+        Returns
+        -------
+        dict of str to int
+            By the name of each model in use, how many entries it took.
+
+        Raises
+        ------
+        OSError
+            If they cannot be written.
+        """
         used = {}
         blocks = blocks_of(self.region.pixels)
         inverse = np.divide(1, self.peaks, out=np.zeros_like(self.peaks), where=self.peaks > 0)
@@ -153,6 +215,18 @@ def _halves(values: NDArray, unit: float) -> NDArray[np.float16]:
 
 
 def stored_layer(name: str, pixels: NDArray) -> NDArray:
-    """One of `field.LAYERS` as it is stored: exactly what is of one ray or light, else halves."""
+    """A layer as it is stored: exactly what is of one ray or light, else in half floats.
+
+    Parameters
+    ----------
+    name : str
+        One of `field.LAYERS`, or of a light group.
+    pixels : (h, w) or (h, w, 3) float
+
+    Returns
+    -------
+    array
+        float32 or float16, of the same shape.
+    """
     exact = name in OF_ONE_RAY or name.startswith("own")
     return pixels.astype(np.float32 if exact else np.float16)

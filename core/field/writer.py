@@ -1,11 +1,20 @@
-"""Writing a reflectance field, tile by tile; it is there only when it is complete."""
+"""Writing a reflectance field, tile by tile; it is there only when it is complete.
+
+>>> import tempfile
+>>> with tempfile.TemporaryDirectory() as folder:
+...     writer = FieldWriter(Path(folder) / "field", Hemicube(patches=1), (1080, 1920))
+...     before = writer.folder.exists()
+...     writer.close()
+...     print(before, Field(writer.folder).shape)
+False (1080, 1920)
+"""
 
 from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from numpy.typing import NDArray
 
@@ -13,7 +22,9 @@ from .. import marked
 from ..errors import FieldError
 from ..files import PART, replace_folder, write_text
 from ..hemicube import Hemicube
-from .field import HEADER, VERSION, Field, proxy_folder
+from .about import About
+from .field import Field, proxy_folder
+from .head import HEADER, FieldHead, FieldTile
 from .proxy import FACTORS, proxies
 from .tile import SUFFIX
 from .tile_file import rewrite, written
@@ -21,67 +32,101 @@ from .tile_folder import rewrite_folder
 from .tile_writer import TileWriter, stored_layer
 
 
-def describe(hemicube: Hemicube, shape: tuple[int, int], **about: Any) -> dict[str, Any]:
-    """A new `field.json` without tiles. `about` takes whatever else a reader should know."""
-    return {
-        "format": "ARTO reflectance field",
-        "version": VERSION,
-        "height": shape[0],
-        "width": shape[1],
-        "hemicube": hemicube.to_json(),
-        "patches": len(hemicube),
-        "about": about,
-        "tiles": [],
-    }
-
-
 def tile_names(number: int) -> tuple[str, str]:
-    """What a tile is called in the folder of its field: its file, and the folder that it was in
-    fields of the version before."""
+    """What a tile is called in the folder of its field.
+
+    Parameters
+    ----------
+    number : int
+        Of the tile, from the top.
+
+    Returns
+    -------
+    tuple of str
+        Its file, and the folder that it was in fields of the version before.
+    """
     return f"tile_{number:04d}{SUFFIX}", f"tile_{number:04d}"
 
 
 def write_tile(
     folder: Path, number: int, tile: TileWriter, hemicube: Hemicube, of: Path | None = None
-) -> dict[str, Any]:
-    """Write a tile and its proxies into the folder of a field, whole or not at all -> its entry in
-    `field.json`.
+) -> FieldTile:
+    """Write a tile and its proxies into the folder of a field, whole or not at all.
 
-    number: tiles are written from the top; of: the field that it will be, for messages. Raises
-    FieldError.
+    Parameters
+    ----------
+    folder : Path
+        The field's.
+    number : int
+        Of the tile; tiles are written from the top.
+    tile : TileWriter
+        What was fitted.
+    hemicube : Hemicube
+        Its patches.
+    of : Path, optional
+        The folder that the field will have, for messages.
+
+    Returns
+    -------
+    FieldTile
+        Its entry in the head of the field.
+
+    Raises
+    ------
+    FieldError
+        If it cannot be written.
     """
     name, _ = tile_names(number)
 
-    def write(tile: TileWriter, folder: Path) -> dict[str, Any]:
-        r = tile.region
+    def write(tile: TileWriter, folder: Path) -> FieldTile:
         folder.mkdir(parents=True, exist_ok=True)
         marked.mark(folder, "field")
         with written(folder / name) as out:
-            used = tile.write(out)
-        return {"file": name, "region": [r.x, r.y, r.width, r.height], "entries": used}
+            return FieldTile(name, tile.region, tile.write(out))
 
     with _writing(of or folder):
         # the tile itself last: where it is, its proxies are
         smaller = {
-            str(factor): write(proxy, proxy_folder(folder, factor))
+            factor: write(proxy, proxy_folder(folder, factor))
             for factor, proxy in proxies(tile, hemicube, number == 0).items()
         }
-        return write(tile, folder) | {"proxies": smaller}
+        return replace(write(tile, folder), proxies=smaller)
 
 
-def write_head(folder: Path, head: dict[str, Any]) -> None:
-    """Write `field.json`: with it the field is one. Raises FieldError."""
+def write_head(folder: Path, head: FieldHead) -> None:
+    """Write `field.json`, and those of the field's proxies: with it the field is one.
+
+    Parameters
+    ----------
+    folder : Path
+        The field's.
+    head : FieldHead
+        What it says.
+
+    Raises
+    ------
+    FieldError
+        If it cannot be written.
+    """
     with _writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         marked.mark(folder, "field")
         for factor in FACTORS:
-            tiles = [t.get("proxies", {}).get(str(factor)) for t in head["tiles"]]
-            if tiles and all(tiles):
-                size = {side: -(-head[side] // factor) for side in ("height", "width")}
-                about = head["about"] | {"proxy": factor}
-                own = head | size | {"about": about, "tiles": tiles}
-                write_text(proxy_folder(folder, factor) / HEADER, json.dumps(own, indent=1))
-        write_text(folder / HEADER, json.dumps(head, indent=1))
+            tiles = [tile.proxies[factor] for tile in head.tiles if factor in tile.proxies]
+            if tiles and len(tiles) == len(head.tiles):
+                own = replace(
+                    head,
+                    height=-(-head.height // factor),
+                    width=-(-head.width // factor),
+                    about=replace(head.about, proxy=factor),
+                    tiles=tuple(tiles),
+                )
+                write_text(proxy_folder(folder, factor) / HEADER, _text(own))
+        write_text(folder / HEADER, _text(head))
+
+
+def _text(head: FieldHead) -> str:
+    return json.dumps(head.to_json(), indent=1)
 
 
 def replace_layers(field: Field, layers: dict[str, NDArray]) -> None:
@@ -91,9 +136,9 @@ def replace_layers(field: Field, layers: dict[str, NDArray]) -> None:
 
     Parameters
     ----------
-    field
+    field : Field
         The field; not its proxies, which are fields of their own.
-    layers
+    layers : dict of str to array
         By their names, of the whole picture, (H, W) or (H, W, 3).
 
     Raises
@@ -111,13 +156,30 @@ def replace_layers(field: Field, layers: dict[str, NDArray]) -> None:
 class FieldWriter:
     """Writes a field tile by tile. It is there only once `close` has returned.
 
-    Raises FieldError where it cannot be written, and FilesError where what is at `folder` was not
-    made by ARTO.
+    Parameters
+    ----------
+    folder : Path
+        Where it will be; a field that is there stays until then.
+    hemicube : Hemicube
+        Its patches.
+    shape : tuple of int
+        Height and width of the whole picture.
+    about : About, optional
+        What it is made from.
+
+    Raises
+    ------
+    FieldError
+        If it cannot be written.
+    FilesError
+        If what is at `folder` was not made by ARTO.
     """
 
-    def __init__(self, folder: Path, hemicube: Hemicube, shape: tuple[int, int], **about: Any):
-        self.folder, self.hemicube = folder, hemicube
-        self.head = describe(hemicube, shape, **about)
+    def __init__(
+        self, folder: Path, hemicube: Hemicube, shape: tuple[int, int], about: About | None = None
+    ) -> None:
+        self.folder = folder
+        self.head = FieldHead(hemicube, *shape, about or About())
         if os.path.lexists(folder):
             marked.check(folder, None, folder.parent)  # before the work, and not after it
         # what the version before left where its process was killed
@@ -126,11 +188,37 @@ class FieldWriter:
             self.partial = marked.scratch(folder, "field")
 
     def add(self, tile: TileWriter) -> None:
-        self.head["tiles"].append(
-            write_tile(self.partial, len(self.head["tiles"]), tile, self.hemicube, self.folder)
-        )
+        """Write the next tile, from the top.
 
-    def close(self) -> None:
+        Parameters
+        ----------
+        tile : TileWriter
+            What was fitted.
+
+        Raises
+        ------
+        FieldError
+            If it cannot be written.
+        """
+        number, hemicube = len(self.head.tiles), self.head.hemicube
+        found = write_tile(self.partial, number, tile, hemicube, self.folder)
+        self.head = replace(self.head, tiles=(*self.head.tiles, found))
+
+    def close(self, about: About | None = None) -> None:
+        """Put the field in its place.
+
+        Parameters
+        ----------
+        about : About, optional
+            What it was made from, where that has changed.
+
+        Raises
+        ------
+        FieldError
+            If it cannot be written, or what is there is in use.
+        """
+        if about is not None:
+            self.head = replace(self.head, about=about)
         write_head(self.partial, self.head)
         with _writing(self.folder):
             replace_folder(self.partial, self.folder)

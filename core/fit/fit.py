@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Generator, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,7 @@ from ..capture.basis_images import BasisImages
 from ..capture.capture_set import CaptureSet
 from ..capture.moments import Moments
 from ..capture.tile_data import TileData
+from ..field.about import About
 from ..field.tile_writer import TileWriter
 from ..field.writer import FieldWriter, write_tile
 from ..hemicube import Hemicube
@@ -170,12 +172,12 @@ def fit_into(
         ):
             if isinstance(step, TileWriter):
                 folder.mkdir(exist_ok=True)
-                return write_tile(folder, tile, step, captured.hemicube)
+                return write_tile(folder, tile, step, captured.hemicube).to_json()
             yield step
     raise AssertionError("a fit ends with its tile")
 
 
-def about_of(captured: CaptureSet, choice: str, separate: bool, **about: Any) -> dict[str, Any]:
+def about_of(captured: CaptureSet, choice: str, separate: bool) -> About:
     """Collect what the description of a field says beside its tiles.
 
     Parameters
@@ -183,32 +185,30 @@ def about_of(captured: CaptureSet, choice: str, separate: bool, **about: Any) ->
     captured : CaptureSet
     choice : str
     separate : bool
-    about : object
-        More values, by name.
 
     Returns
     -------
-    dict
+    About
     """
     head = captured.head
-    said = {
-        "scene": head.scene,
-        "colour_space": head.colour_space,
-        "samples": head.samples,
-        "file": head.file,
-        "frame": head.frame,
-        "view_layer": head.view_layer,
-        "far": head.far,
-        "key": head.key,
-        "fingerprint": head.fingerprint,
-        "route": head.route,
-        "shot": head.shot.to_json() if head.shot else None,
-        "catchers": None if head.catchers is None else list(head.catchers),
-        "take": head.take,
-        "pair": head.pair,
-    }
-    known = {name: value for name, value in said.items() if value is not None}
-    return {"choice": choice, "separate": separate} | known | about
+    return About(
+        choice=choice,
+        separate=separate,
+        scene=head.scene,
+        colour_space=head.colour_space,
+        samples=head.samples,
+        file=head.file,
+        frame=head.frame,
+        view_layer=head.view_layer,
+        far=head.far,
+        key=head.key,
+        fingerprint=head.fingerprint,
+        route=head.route,
+        shot=head.shot,
+        catchers=head.catchers,
+        take=head.take,
+        pair=head.pair,
+    )
 
 
 def fit(
@@ -216,7 +216,6 @@ def fit(
     folder: Path,
     choice: str = "auto",
     separate: bool = False,
-    **about: Any,
 ) -> Iterator[tuple[float, str]]:
     """Fit a whole capture set and write the field.
 
@@ -232,8 +231,6 @@ def fit(
         One of `choice.CHOICES`.
     separate : bool
         Whether each channel gets a support of its own.
-    about : object
-        More values for the field's description, by name.
 
     Yields
     ------
@@ -253,8 +250,8 @@ def fit(
     """
     choices.check(choice, captured.patterns, separate)
     begun, reading = time.perf_counter(), 0.0
-    about = about_of(captured, choice, separate, **about)
-    writer = FieldWriter(folder, captured.hemicube, captured.shape, **about)
+    about = about_of(captured, choice, separate)
+    writer = FieldWriter(folder, captured.hemicube, captured.shape, about)
     try:
         tiles = len(captured.regions)
         for tile in range(tiles):
@@ -270,8 +267,7 @@ def fit(
                         if step == READING:
                             reading += time.perf_counter() - start
                         yield (tile + step) / tiles, f"fitting tile {tile + 1} of {tiles}"
-        writer.head["about"]["fit_seconds"] = round(time.perf_counter() - begun, 3)
-        writer.head["about"]["read_seconds"] = round(reading, 3)
-        writer.close()
+        took = round(time.perf_counter() - begun, 3)
+        writer.close(replace(about, fit_seconds=took, read_seconds=round(reading, 3)))
     finally:
         writer.abandon()

@@ -282,7 +282,7 @@ def test_an_earlier_capture_stays_whole_until_the_new_one_is(tmp_path):
     for one, two in zip(relit_and_share(scene), expected, strict=True):
         np.testing.assert_array_equal(one, two)
     captured(scene)
-    assert Field(paths.field_folder(scene)).about["samples"] == 5
+    assert Field(paths.field_folder(scene)).about.samples == 5
     relit_and_share(scene)
     # and without the catcher, there is one take again
     scene.objects["Floor"].is_shadow_catcher = False

@@ -32,6 +32,6 @@ def test_a_thing_that_some_rays_pass(tmp_path, flag):
     scene = with_catcher(tmp_path, samples=192, patches=2)
     setattr(scene.objects["Matt"], flag, False)
     captured(scene)
-    assert Field(paths.field_folder(scene)).about["route"] == "sampled"
+    assert Field(paths.field_folder(scene)).about.route == "sampled"
     share, _ = assert_in_footage_as_by_cycles(scene, tmp_path)
     assert share[14:].min() < 0.95

@@ -64,7 +64,7 @@ def test_parts_are_what_one_machine_makes(farm_scene, tmp_path, monkeypatch):
     (found,) = work.run(gather(job.folder))
     assert found == paths.field_folder(farm_scene)
     assert_same(arrays(found), alone)
-    assert Field(found).about["samples"] == 16
+    assert Field(found).about.samples == 16
     assert not list((job.folder / "parts").iterdir())
     # and again, which has nothing to do
     assert work.run(gather(job.folder)) == [found]
@@ -95,7 +95,7 @@ def test_two_seeds_are_one_capture_of_twice_the_samples(farm_scene, tmp_path):
     # seeds are averaged light by light, so a part has its images
     assert len(list(job.folder.rglob("*.exr"))) == 2
     (folder,) = work.run(gather(job.folder))
-    assert Field(folder).about["samples"] == 64
+    assert Field(folder).about.samples == 64
     assert not list(tmp_path.rglob("*.exr")), "once fitted, the images go"
     errors = [mean_relative_error(p, truth) for p in (single, double, picture(folder))]
     assert errors[1] < 0.85 * errors[0]
@@ -108,7 +108,7 @@ def test_kept_images_of_seeds_are_a_capture_set(farm_scene, tmp_path):
     one seed's samples alone is not taken for one of it."""
     farm_scene.arto.keep = "always"
     captured(farm_scene)
-    assert Field(work.run(fit.fit(farm_scene))).about["samples"] == 16
+    assert Field(work.run(fit.fit(farm_scene))).about.samples == 16
     job = planned_job(farm_scene, tmp_path / "job", seeds=2, tiles=1)
     each = []
     for p in job.parts:
@@ -122,7 +122,7 @@ def test_kept_images_of_seeds_are_a_capture_set(farm_scene, tmp_path):
     mean = (each[0].basis + each[1].basis) / 2
     np.testing.assert_allclose(found.basis, mean, atol=1e-6)
     assert np.abs(each[0].basis - each[1].basis).mean() > 1e-4, "two seeds differ"
-    assert Field(work.run(fit.fit(farm_scene))).about["samples"] == 32
+    assert Field(work.run(fit.fit(farm_scene))).about.samples == 32
 
 
 @pytest.mark.newest

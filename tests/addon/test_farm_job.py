@@ -72,7 +72,7 @@ def test_the_quality_is_that_of_the_scene(farm_scene, tmp_path, seeds):
     steps.close()
     (found,) = work.run(gather(job.folder))
     head = CaptureSet(paths.capture_folder(farm_scene)).head
-    assert Field(found).about["samples"] == head.samples == 6 * seeds
+    assert Field(found).about.samples == head.samples == 6 * seeds
     assert {name: getattr(farm_scene.arto, name) for name in FARM} == before
 
 
@@ -84,7 +84,7 @@ def test_a_scene_that_has_no_id_yet_is_found_when_it_is_renamed(farm_scene, tmp_
     work.run(parts.render_part(job.folder, 0))
     (found,) = work.run(gather(job.folder))
     assert farm_scene.arto.scene_id
-    assert Field(found).about["shot"]["scene_id"] == farm_scene.arto.scene_id
+    assert Field(found).about.shot.scene_id == farm_scene.arto.scene_id
     farm_scene.name = "Renamed"
     work.run(relight(farm_scene))
 
@@ -115,7 +115,7 @@ def test_a_job_of_the_version_before_goes_on(farm_scene, tmp_path):
     (job.folder / job_heads.HEADER).write_text(json.dumps(data | {"version": 1}))
     work.run(parts.render_part(job.folder, 1))
     (found,) = work.run(gather(job.folder))
-    assert Field(found).about["samples"] == 16 and farm_scene.arto.overscan == 0
+    assert Field(found).about.samples == 16 and farm_scene.arto.overscan == 0
 
 
 def test_the_parts_of_all_seeds_must_find_room(farm_scene, tmp_path, monkeypatch):

@@ -123,7 +123,7 @@ def test_stretches_of_takes_are_one_capture_of_their_samples(tmp_path):
     work.run(fit.fit(scene))
     for name in ("", *TAKES):
         about = Field(paths.field_folder(scene).parent / name / "field").about
-        assert about["samples"] == 16
+        assert about.samples == 16
     for found, right, noisy in zip(relit_and_share(scene), expected, other, strict=True):
         noise = np.abs(noisy - right).mean()
         assert noise > 1e-3
@@ -185,7 +185,8 @@ def test_takes_are_of_the_frames_that_show_a_catcher(tmp_path):
     first, second = work.run(gather(job.folder))
     assert [(first.parent / name).exists() for name in TAKES] == [True, True]
     assert [(second.parent / name).exists() for name in TAKES] == [False, False]
-    assert Field(first).about["catchers"] == ["Floor"] and "catchers" not in Field(second).about
+    assert Field(first).about.catchers == ("Floor",)
+    assert Field(second).about.catchers is None
     relit_and_share(scene)
 
 

@@ -110,7 +110,7 @@ def test_a_stopped_stream_goes_on(tmp_path, monkeypatch, after):
     there = arrays(paths.field_folder(scene))
     for name, array in whole.items():
         np.testing.assert_array_equal(there[name], array)
-    assert Field(paths.field_folder(scene)).about["choice"] == "auto"
+    assert Field(paths.field_folder(scene)).about.choice == "auto"
 
 
 def test_a_fit_that_fails_fails_the_capture(tmp_path, monkeypatch):
@@ -135,7 +135,7 @@ def test_kept_where_they_fit(tmp_path):
     assert CaptureSet(run(scene)).kept
     scene.arto.keep_limit = 0.0
     assert not CaptureSet(run(scene)).kept
-    assert Field(paths.field_folder(scene)).about["key"]
+    assert Field(paths.field_folder(scene)).about.key
 
 
 def test_the_estimate_is_of_what_comes(tmp_path, monkeypatch):

@@ -49,7 +49,7 @@ def looked_at(there: Any) -> None:
     else:
         there.shares()
         there.bytes_per_pixel()
-        found = there.about
+        found = there.about.to_json()
     for name, kind in (("fingerprint", dict), ("shot", dict), ("view_layer", str), ("key", str)):
         assert found.get(name) is None or isinstance(found[name], kind)
 

@@ -12,7 +12,8 @@ import pytest
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import FieldError
 from arto.core.field import tile_file
-from arto.core.field.field import HEADER, VERSION, Field
+from arto.core.field.field import Field
+from arto.core.field.head import HEADER, VERSION
 from arto.core.field.tile import FULL
 from arto.core.field.tile_writer import TileWriter
 from arto.core.field.writer import FieldWriter
@@ -171,7 +172,7 @@ def test_opening_reads_no_arrays(tmp_path: Path, capture: Path, fitted, monkeypa
     with monkeypatch.context() as m:
         m.setattr(tile_file, "_opened", touched)
         field = Field(tmp_path / "field")
-        assert field.shares() and field.about["choice"] == "box"
+        assert field.shares() and field.about.choice == "box"
         with pytest.raises(AssertionError):
             field.layer("alpha")
     for model in field.tiles[0].models:
@@ -184,11 +185,12 @@ def test_about_says_what_made_it(tmp_path: Path, scene) -> None:
 
     made = scene(CUBE)
     capture_set.write(tmp_path / "c", CUBE, made.patterns, made.basis, scene="Shot 10", samples=8)
-    steps = list(fit.fit(CaptureSet(tmp_path / "c"), tmp_path / "f", "auto", machine="a farm"))
+    steps = list(fit.fit(CaptureSet(tmp_path / "c"), tmp_path / "f", "auto"))
     about = Field(tmp_path / "f").about
-    assert about["scene"] == "Shot 10" and about["samples"] == 8
-    assert about["choice"] == "auto" and about["machine"] == "a farm"
-    assert about["fit_seconds"] >= about["read_seconds"] >= 0
+    assert about.scene == "Shot 10" and about.samples == 8
+    assert about.choice == "auto" and about.separate is False and about.view_layer is None
+    assert about.fit_seconds is not None and about.read_seconds is not None
+    assert about.fit_seconds >= about.read_seconds >= 0
     shares = [share for share, _ in steps]
     assert shares == sorted(shares) and shares[0] == 0 and shares[-1] == 1
     assert len(steps) == len(CUBE) + 2
@@ -208,7 +210,9 @@ def test_another_version(field_folder: Path, refused) -> None:
     head = json.loads((field_folder / HEADER).read_text())
     for version in (VERSION + 1, 1, "3", 3.0, True, None):
         (field_folder / HEADER).write_text(json.dumps(head | {"version": version}))
-        refused(field_folder, f"version {version}; this ARTO reads version {VERSION}")
+        refused(
+            field_folder, f"version {version}; this ARTO reads version {VERSION}, and 2: fit again"
+        )
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", "{}", "3"])

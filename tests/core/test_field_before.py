@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from arto.core.errors import FieldError
-from arto.core.field.field import HEADER, Field
+from arto.core.field.field import Field
+from arto.core.field.head import HEADER
 from arto.core.field.writer import replace_layers
 from arto.core.hemicube import Hemicube
 from arto.core.light.light import PatchLight

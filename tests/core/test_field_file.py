@@ -19,6 +19,7 @@ from arto.core.field import tile_file
 from arto.core.field.field import Field
 from arto.core.field.tile_file import ALIGNED, TileFile, rewrite, written
 from arto.core.hemicube import Hemicube
+from arto.core.marked import MARK
 
 CUBE = Hemicube(faces=("top", "back"), patches=2)
 # As docs/field-format.md has it.
@@ -225,7 +226,7 @@ def test_bits_of_the_arrays(folder: Path, tile: Path, used) -> None:
             rewrite(tile, {"depth": np.ones((6, 8), np.float32)})
         assert tile.read_bytes() == bytes(wrong)
     assert refused > 10
-    assert {p.name for p in folder.iterdir() if p.is_file()} == {"field.json", tile.name}
+    assert {p.name for p in folder.iterdir() if p.is_file()} == {MARK, "field.json", tile.name}
 
 
 def put(index: list[dict[str, Any]], key: str, value: Any) -> list[dict[str, Any]]:
@@ -333,5 +334,5 @@ def test_a_rewrite_that_fails_leaves_the_file(folder: Path, tile: Path, monkeypa
         with pytest.raises(OSError, match="no room"):
             rewrite(tile, {"alpha": np.ones((6, 8), np.float16)})
     assert tile.read_bytes() == content
-    assert {p.name for p in folder.iterdir() if p.is_file()} == {"field.json", tile.name}
+    assert {p.name for p in folder.iterdir() if p.is_file()} == {MARK, "field.json", tile.name}
     assert Field(folder).has_layer("alpha")

@@ -41,7 +41,7 @@ def test_a_fit_that_is_stopped_keeps_the_old_field(
     assert contents(tmp_path / "field") == before
     assert {f.name for f in tmp_path.iterdir()} == {"capture", "field"}
     # and run to its end it is replaced
-    assert fitted(capture, tmp_path / "field", "box").about["choice"] == "box"
+    assert fitted(capture, tmp_path / "field", "box").about.choice == "box"
     assert {f.name for f in tmp_path.iterdir()} == {"capture", "field"}
 
 

@@ -94,7 +94,7 @@ def test_a_proxy_is_the_mean_of_its_pixels(
     inside = tuple(slice(0, side // factor) for side in SHAPE)
     np.testing.assert_allclose(got[inside], expected[inside], rtol=0.03)
     assert np.abs(got[inside] / expected[inside] - 1).mean() < 0.005
-    assert field.proxy(factor).about["proxy"] == factor
+    assert field.proxy(factor).about.proxy == factor
 
 
 def test_a_proxy_of_boxes_is_near(tmp_path: Path, scene, write_scene, fitted, noisy) -> None:
