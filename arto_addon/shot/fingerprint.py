@@ -1,14 +1,14 @@
-"""The fingerprint: what everything in the picture was when it was captured, thing by thing.
+"""The fingerprint: a digest of each thing in the picture, as the thing was when it was captured.
 
-A dictionary from a thing in words, `Material 'Can paint'`, to a digest of it. Two of them tell
-whether the scene is still the one that was captured, and if not, what has changed. It is of the
-data that a render is made of, and not of the render: cheap enough to be asked again after each
-change, because the arrays of meshes, which are most of it, are only read again when Blender says
-that they changed.
+A fingerprint is a dictionary from a thing in words, `Material 'Can paint'`, to a digest of the
+thing. Two fingerprints tell whether the scene is still as it was captured, and what has changed.
+They are made of the scene's data, so nothing is rendered for them. Most of the data are the arrays
+of meshes, which are only read again when Blender says that they changed. So a fingerprint is cheap
+enough to be made after each change.
 
-What is worked out from that data (transforms under constraints, deformed meshes) is in it as well,
-by names that begin with `=`, where the viewport has worked it out: such a thing is compared only
-where both sides have it.
+The viewport works out more from this data: transforms under constraints, and deformed meshes. These
+are in the fingerprint by names that begin with `=`. They are compared only where both fingerprints
+have them.
 """
 
 from __future__ import annotations
@@ -23,13 +23,15 @@ from . import walk
 
 Fingerprint = dict[str, str]
 
-# Settings of the scene that a capture leaves to the artist, and that change how it answers light.
+# Settings of the scene that a capture leaves to the artist, and that change how the scene answers
+# light.
 _RENDER = (
     "filter_size", "use_motion_blur", "motion_blur_shutter", "motion_blur_position", "use_simplify",
     "simplify_subdivision_render", "simplify_child_particles_render", "simplify_volumes",
     "hair_type", "hair_subdiv", "use_high_quality_normals",
 )  # fmt: skip
-# Of Cycles, all but those that a capture sets itself, or that only how long it takes hangs on.
+# Beginnings of the names of Cycles' settings that do not count: a capture sets them itself, or they
+# only change how long a render takes. All other settings of Cycles count.
 _CYCLES_NOT = (
     "preview_", "denois", "adaptive", "debug_", "bake_", "samples", "seed", "device", "tile_",
     "use_auto_tile", "time_limit", "use_denois", "use_preview", "use_adaptive", "use_animated_seed",
@@ -49,13 +51,13 @@ _LAYER = (
 _GEOMETRY = (bpy.types.Mesh, bpy.types.Curves, bpy.types.PointCloud)
 _EXTERNAL = (bpy.types.Volume, bpy.types.CacheFile)
 
-# By `session_uid`: digests of what Blender tells changes of, dropped when it does.
+# Digests by `session_uid`. Each is dropped when Blender says that its data-block has changed.
 _arrays: dict[int, str] = {}
 _evaluated: dict[int, str] = {}
 
 
 def forget(changed: Iterable[int] | None = None) -> None:
-    """Read these again (by `session_uid`), or everything."""
+    """Drop the kept digests of the data-blocks with these `session_uid`s; of None, of all."""
     for kept in (_arrays, _evaluated):
         if changed is None:
             kept.clear()
@@ -67,10 +69,11 @@ def forget(changed: Iterable[int] | None = None) -> None:
 def fingerprint(
     scene: bpy.types.Scene, view_layer: str, then: Fingerprint | None = None, full: bool = False
 ) -> Fingerprint:
-    """The fingerprint of what a view layer renders.
+    """Make the fingerprint of what a view layer renders.
 
-    then: one that it is going to be compared with, for files that only have another time; full:
-    read the files in any case, for one that others are to be compared with.
+    then: the fingerprint that the new one will be compared with. By `then`, a file with a new time
+    and the old contents counts as unchanged. full: read all files, whatever their times. This is
+    for the fingerprint of a capture, with which later ones are compared.
     """
     then = then or {}
     if full:
@@ -89,9 +92,9 @@ def of_blocks(
     full: bool = False,
     without: Iterable[bpy.types.NodeSocket] = (),
 ) -> Fingerprint:
-    """The fingerprint of some data-blocks and all that they point to; see `fingerprint`.
+    """Make the fingerprint of some data-blocks and all that they point to.
 
-    without: sockets whose values do not count.
+    then, full: see `fingerprint`; without: sockets whose values do not count.
     """
     passed = {(socket.as_pointer(), type(socket)) for socket in without}
     then, out = then or {}, {}
@@ -125,20 +128,20 @@ def of_blocks(
 
 
 def key_of(found: Fingerprint) -> str:
-    """A short digest of the whole, without what only the viewport works out."""
+    """A short digest of a whole fingerprint, without what the viewport has worked out."""
     text = repr([(k, v) for k, v in found.items() if not k.startswith("=")])
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def changes(then: Fingerprint, now: Fingerprint) -> list[str]:
-    """What has changed since, in words, the most telling first."""
+    """List in words what differs between two fingerprints, the most telling change first."""
     out = []
     for name in sorted(then.keys() | now.keys(), key=_telling):
         a, b = then.get(name), now.get(name)
         if a == b:
             continue
         if name.startswith("="):
-            # worked out under the same settings of the viewport, or not to be compared
+            # Comparable only if both were worked out under the same settings of the viewport.
             if a and b and a.split(":")[0] == b.split(":")[0]:
                 out.append(f"{name[1:]} changed since")
         elif b is None:
@@ -148,7 +151,8 @@ def changes(then: Fingerprint, now: Fingerprint) -> list[str]:
     return list(dict.fromkeys(out))
 
 
-# An object is named after its data, and what it points to after it: the last word has what changed.
+# The order in which changes are told. A change of a mesh or a material says more than that its
+# object has changed as well, so objects come late.
 _ORDER = ("Material", "Mesh", "Light", "Image", "Camera", "Curve", "Node", "Object", "Collection")
 
 
@@ -169,7 +173,7 @@ def _words(block: bpy.types.ID) -> str:
 
 
 def _rendered(layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
-    """The objects that a render of the view layer has, wherever the viewport hides them."""
+    """The objects that a render of the view layer has, also those that the viewport hides."""
     out: dict[int, bpy.types.Object] = {}
 
     def visit(there: bpy.types.LayerCollection) -> None:
@@ -202,14 +206,14 @@ def _settings(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> str:
 
 
 def _flags(there: bpy.types.LayerCollection) -> list[object]:
-    """Collections that the view layer holds out, or sees only in reflections."""
+    """The collections that the view layer holds out, or shows only indirectly."""
     own = [(there.name, there.holdout, there.indirect_only)]
     found = own if there.holdout or there.indirect_only else []
     return found + [f for child in there.children for f in _flags(child)]
 
 
 def _worked_out(layer: bpy.types.ViewLayer) -> Fingerprint:
-    """Transforms and deformed geometry, as far as the viewport has them."""
+    """Digests of the transforms and deformed geometry that the viewport has worked out."""
     depsgraph = layer.depsgraph
     if depsgraph is None or not depsgraph.scene:
         return {}

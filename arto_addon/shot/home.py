@@ -1,7 +1,7 @@
-"""The artist's file: where paths that hang on the .blend begin.
+"""The artist's file, whose folder is where paths that begin with `//` start.
 
-A job works on a copy of the .blend in another folder. Whatever it reads or writes by a path of the
-artist's goes by the file that the copy is of.
+A job works on a copy of the .blend in another folder. Its paths that begin with `//` still start at
+the folder of the original .blend.
 """
 
 from __future__ import annotations
@@ -16,18 +16,24 @@ _home: list[str] = []
 
 
 def set_file(path: str) -> None:
-    """This process works on a copy of that .blend (empty: of one that was never saved)."""
+    """Note that this process works on a copy of a .blend.
+
+    path: the original, empty where the original was never saved.
+    """
     _home[:] = [path]
 
 
 def file() -> str:
-    """The artist's .blend, empty where it was never saved."""
+    """The path of the artist's .blend; empty where the .blend was never saved."""
     return _home[0] if _home else bpy.data.filepath
 
 
 def absolute(path: str, library: bpy.types.Library | None = None) -> Path:
-    """A path of the artist's, made absolute. Raises SceneError where it hangs on a .blend that
-    was never saved."""
+    """Make a path from the artist's file absolute.
+
+    library: the library that the path comes from. Raises SceneError where the path begins with `//`
+    and the .blend was never saved.
+    """
     if not path.startswith("//") or library:
         return Path(bpy.path.abspath(path, library=library))
     if not file():

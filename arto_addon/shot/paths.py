@@ -1,10 +1,10 @@
-"""Where what belongs to a shot is kept.
+"""Where the files of a shot are kept.
 
 `//arto/<file>/<scene>/<camera>_<frame>/` holds `shot.json`, the capture set in `capture`, the
-field in `field`, and captures that were stopped in `unfinished-...`. Names lead to a folder; whose
-it is, its `shot.json` says. So a renamed scene, file or camera finds its folder by the scene's ID,
-another's folder of the same name is left alone, and a copy of a file does not write into the
-folder of the file it was copied from.
+field in `field`, and captures that were stopped in `unfinished-...`. Names lead to a folder, and
+the `shot.json` in the folder says to which shot the folder belongs. So a renamed scene, file or
+camera finds its folder by the scene's ID. The folder of another shot with the same names is left
+alone. A copied file does not write into the folder of its original.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ from .shot import shot_of
 
 HEADER = "shot.json"
 _MOST_BYTES = 1 << 20
-# Endings that an output may have by habit: what is written is EXR.
+# Endings that an artist may give to an output by habit: .exr takes their place.
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr"}
-_SECONDS = 1.0  # for which a panel need not look at the disk again
+_SECONDS = 1.0  # A panel looks at the disk again after so many seconds.
 _found: dict[tuple[Path, Shot, str], tuple[float, Place]] = {}
 
 
@@ -45,9 +45,10 @@ _found: dict[tuple[Path, Shot, str], tuple[float, Place]] = {}
 class Place:
     """Where a shot's files are.
 
-    folder: its own, to write to; source: where what is there already is read from, mostly the
-    same; owner: whose that is where it is another file's or scene's, in words, and must be asked
-    for (`adopt`); earlier: whether it was written by the version before, which named no shots.
+    folder: the shot's own folder, to write to; source: the folder to read from, mostly the same;
+    owner: the other file or scene that `source` belongs to, in words, or "" (the artist must agree
+    before its files are used, see `adopt`); earlier: whether `source` is of an earlier version of
+    ARTO, whose folders name no shots.
     """
 
     folder: Path
@@ -57,7 +58,7 @@ class Place:
 
     @property
     def readable(self) -> Path:
-        """Where to read from. Raises ShotError where that is another's."""
+        """The folder to read from. Raises ShotError where the folder has another owner."""
         if self.owner:
             raise ShotError(
                 f"what is there was captured for {self.owner}: press Use It There in ARTO's panel "
@@ -71,7 +72,7 @@ def _root(scene: bpy.types.Scene) -> Path:
 
 
 def _shot_in(folder: Path) -> tuple[Shot, str] | None:
-    """The shot whose folder this is and the .blend it was captured from, as seen from the root."""
+    """The shot to which a folder belongs, and the captured .blend as a path from the root."""
     path = folder / HEADER
     if not os.path.lexists(path):
         return None
@@ -79,14 +80,14 @@ def _shot_in(folder: Path) -> tuple[Shot, str] | None:
         said = Description(path, ShotError, _MOST_BYTES)
         return Shot.from_json(said.data.get("shot")), said.kind("blend", str, "")
     except ArtoError:
-        # a folder whose shot cannot be read is nobody's: it is passed by, not written into
+        # A folder whose shot cannot be read is passed by: nothing is written into it.
         return Shot("", 0, 0, 0, (), (), scene_id="damaged"), ""
 
 
 def _is_ours(shot: Shot, there: Shot) -> bool:
-    """Whether a folder that the shot's names lead to is the shot's own."""
+    """Whether a folder with the shot's names belongs to the shot. there: the folder's shot."""
     if shot.scene_id is None:
-        # not captured yet in this session, or never saved since: the names must do
+        # The scene has no ID: not captured yet, or not saved since. So the names decide.
         same_names = (shot.file, shot.scene) == (there.file, there.scene)
         return bool(shot.file) and same_names and _with_id(shot, there.scene_id).is_place_of(there)
     return shot.is_place_of(there)
@@ -129,7 +130,7 @@ def _look(root: Path, shot: Shot, origin: bpy.types.Scene | None) -> Place:
                 return Place(own, header.parent, f"the file '{Path(blend).name}'")
             if origin:
                 return Place(own, header.parent, f"the scene '{origin.name}'")
-            # the file, the scene or the camera has another name now
+            # The file, the scene or the camera was renamed.
             return Place(header.parent, header.parent)
     earlier = root / re.sub(r"[^\w .-]", "_", shot.scene)
     if any((earlier / n / h).is_file() for n, h in _HEADERS):
@@ -138,8 +139,9 @@ def _look(root: Path, shot: Shot, origin: bpy.types.Scene | None) -> Place:
 
 
 def _is_there(root: Path, blend: str) -> bool:
-    """Whether a .blend that a description names is there. A machine of the network is not asked for
-    what a file names: on Windows that would tell it the artist's name and password."""
+    """Whether a .blend that a description names exists. A path to another machine is followed only
+    if the root is on the network too: else Windows could be made to send the artist's name and
+    password to any machine."""
     if blend.startswith(("//", "\\\\")) and not str(root).startswith(blend[:2]):
         return False
     return (root / blend).is_file()
@@ -149,9 +151,9 @@ _HEADERS = (("capture", CAPTURE_HEADER), ("field", FIELD_HEADER))
 
 
 def place(scene: bpy.types.Scene, view_layer: str | None = None, fresh: bool = True) -> Place:
-    """Where the files of the scene's shot are.
+    """Find where the files of the scene's shot are.
 
-    fresh: look at the disk, also where it was looked at a moment ago. Raises SceneError, OSError.
+    fresh: look at the disk even if the last look was a moment ago. Raises SceneError, OSError.
     """
     root, shot, origin = _root(scene), shot_of(scene, view_layer), scene_ids.copied_from(scene)
     key = root, shot, origin.name if origin else ""
@@ -164,8 +166,8 @@ def place(scene: bpy.types.Scene, view_layer: str | None = None, fresh: bool = T
 
 
 def nearest(scene: bpy.types.Scene, view_layer: str | None = None) -> Shot | None:
-    """A shot of the same scene that something was captured of, for one that nothing was: of the
-    same camera or frame, if there is one. Raises SceneError, OSError."""
+    """Find the captured shot of the same scene that is most like this one, by view layer, camera
+    and frame; for a shot of which nothing was captured. Raises SceneError, OSError."""
     root, shot = _root(scene), shot_of(scene, view_layer)
     found = []
     for header in root.glob(f"*/*/*/{HEADER}"):
@@ -179,8 +181,8 @@ def nearest(scene: bpy.types.Scene, view_layer: str | None = None) -> Shot | Non
 
 
 def frames(scene: bpy.types.Scene, view_layer: str) -> dict[float, bool]:
-    """The frames of the scene's shots that a capture was begun of, and whether there is a field of
-    each. Raises SceneError, OSError."""
+    """Find the frames of which a capture was begun -> by frame, whether there is a field. Raises
+    SceneError, OSError."""
     root, shot = _root(scene), shot_of(scene, view_layer)
     found: dict[float, bool] = {}
     for header in root.glob(f"*/*/*/{HEADER}"):
@@ -197,26 +199,26 @@ def frames(scene: bpy.types.Scene, view_layer: str) -> dict[float, bool]:
 
 
 def shown(scene: bpy.types.Scene) -> str:
-    """The shot's folder for a panel, empty where there is none."""
+    """The shot's folder as a panel shows it; empty where there is none."""
     try:
         folder = place(scene, fresh=bpy.app.background).folder
         return bpy.path.relpath(str(folder)) if bpy.data.filepath else str(folder)
-    except (ArtoError, OSError, ValueError):  # on another drive too
+    except (ArtoError, OSError, ValueError):  # ValueError: the folder is on another drive.
         return ""
 
 
 def capture_folder(scene: bpy.types.Scene, view_layer: str | None = None) -> Path:
-    """The capture set to read. Raises SceneError; ShotError where it is another's."""
+    """The folder of the capture set to read. Raises SceneError; ShotError for another's folder."""
     return _settled(place(scene, view_layer).readable / "capture")
 
 
 def field_folder(scene: bpy.types.Scene, view_layer: str | None = None) -> Path:
-    """The field to read. Raises SceneError; ShotError where it is another's."""
+    """The folder of the field to read. Raises SceneError; ShotError for another's folder."""
     return _settled(place(scene, view_layer).readable / "field")
 
 
 def _settled(folder: Path) -> Path:
-    """The folder, back at its name where a process was killed while it was being replaced."""
+    """Put a folder back to its name, if a process was killed while replacing it."""
     try:
         settle(folder)
     except OSError as e:
@@ -225,21 +227,21 @@ def _settled(folder: Path) -> Path:
 
 
 def unfinished_folder(folder: Path, key: str) -> Path:
-    """Where a capture grows. It takes the place of the finished one only when it is complete."""
+    """The folder in which a capture grows until it is complete. key: the capture's."""
     return folder / f"unfinished-{key[:8]}"
 
 
 def claim(scene: bpy.types.Scene, view_layer: str) -> Path:
-    """The shot's own folder, made and marked as its own; for writing. Raises SceneError."""
+    """Make the shot's own folder, mark it as the shot's, and return it. Raises SceneError."""
     root, folder = _root(scene), place(scene, view_layer).folder
     there = _shot_in(folder)
     if scene_ids.of(scene) is None:
-        # its names led here, or it is new
+        # The shot's names led here, or the folder is new.
         scene_ids.give(scene, there[0].scene_id if there else None)
     shot, blend = shot_of(scene, view_layer), home.file()
     try:
         relative = os.path.relpath(blend, root) if blend else ""
-    except ValueError:  # another drive
+    except ValueError:  # The .blend is on another drive.
         relative = blend
     about = {"shot": shot.to_json(), "blend": Path(relative).as_posix() if relative else ""}
     text = json.dumps(about)
@@ -257,27 +259,27 @@ def claim(scene: bpy.types.Scene, view_layer: str) -> Path:
 
 
 def _says(path: Path, text: str) -> bool:
-    """Whether a file has that text already."""
+    """Whether a file has this text already."""
     with contextlib.suppress(OSError):
         return read_regular(path, _MOST_BYTES) == text.encode()
     return False
 
 
 def worlds_folder(scene: bpy.types.Scene) -> Path:
-    """Where maps of worlds are kept, for all shots."""
+    """The folder of the maps of worlds, which all shots share."""
     return _root(scene) / "worlds"
 
 
 def forget() -> None:
-    """Look at the disk again."""
+    """Forget what the disk looked like, so that the next question looks again."""
     _found.clear()
 
 
 def adopt(scene: bpy.types.Scene, view_layer: str, source: Path) -> Path:
-    """Take what is in `source` for this shot too; returns the shot's own folder.
+    """Use what is in `source` for this shot too; returns the shot's own folder.
 
-    The files are shared where the disk can, which costs nothing: they are never changed, only
-    replaced. Raises SceneError.
+    Files are hard links where the disk allows links, which take no room, and copies elsewhere.
+    Links are safe because ARTO replaces such files and never changes them. Raises SceneError.
     """
     folder = claim(scene, view_layer)
     for name in _KINDS:
@@ -295,7 +297,7 @@ def adopt(scene: bpy.types.Scene, view_layer: str, source: Path) -> Path:
     return folder
 
 
-# What of a shot may be another's too.
+# The folders of a shot that another shot may use.
 _KINDS: dict[str, marked.Kind] = {
     "capture": "capture",
     "field": "field",
@@ -311,12 +313,13 @@ def _share(source: Path, target: Path) -> None:
             shutil.copy2(a, b)
         return b
 
-    marks = shutil.ignore_patterns(marked.MARK)  # the target has its own
+    marks = shutil.ignore_patterns(marked.MARK)  # The target has its own mark.
     shutil.copytree(source, target, copy_function=link, ignore=marks, dirs_exist_ok=True)
 
 
 def relit_name(scene: bpy.types.Scene, look: str | None = None) -> str:
-    """What tells this scene's plate from those of other scenes and looks, empty for the only one.
+    """The name by which this scene's plate differs from those of other scenes and looks; empty for
+    a file's only scene without a look.
 
     The image is then `ARTO <scene> <look>`, the file `<blend>_<scene>_<look>.exr`.
     """
@@ -325,14 +328,14 @@ def relit_name(scene: bpy.types.Scene, look: str | None = None) -> str:
         return ""
     name = f"{scene.name} {shown}".strip()
     others = [s.name for s in bpy.data.scenes if s != scene]
-    # 'A B' under the look C, 'A' under the look B C
+    # Scene 'A B' with the look 'C' and scene 'A' with the look 'B C' would have the same name.
     if any(name.startswith(f"{other} ") for other in others) or shown == _PLAIN:
         name += f"~{short_hash(scene.name, shown)}"
     return name
 
 
-_PLAIN = "relit"  # a plate's ending without a look
-# How names of files end that stand beside a plate; numbers are those of frames.
+_PLAIN = "relit"  # The ending of a plate's name where there is no look.
+# Endings of the names of files beside a plate. Numbers are those of frames.
 _BESIDE = re.compile(
     r"(^|_)(catcher|light|layers|data|comp|composite|world|full|verify|\d{4,})$", re.IGNORECASE
 )
@@ -340,27 +343,27 @@ _HASHES = re.compile(r"([._-]?)(#+)(?=[^#]*$)")
 
 
 def _of_look(look: str) -> str:
-    """What of a file's name is a look's. One that is called as what stands beside the plate of
-    another has a mark, so that neither is written over the other."""
+    """The part of a file's name that stands for a look. Where a look is named like an ending, such
+    as `layers`, the part gets a digest, so that no plate is written over another's layers."""
     name = safe_name(look)
     return f"{name}~{short_hash(look)}" if _BESIDE.search(name) else name
 
 
 def _numbered(stem: str, frame: int) -> tuple[re.Match[str] | None, str]:
-    """Where a file's name has hashes, with what parts them from it, and what stands there at a
-    frame: as many digits as there are hashes."""
+    """Find the hashes in a file's name with the separator before them, and the text for both: the
+    frame's number, in as many digits as there are hashes. (None, "") without hashes."""
     mark = _HASHES.search(stem)
     return (mark, f"{mark[1]}{frame:0{len(mark[2])}d}") if mark else (None, "")
 
 
 def numbers_frames(scene: bpy.types.Scene) -> bool:
-    """Whether the output has a place for the frame's number."""
+    """Whether the name of the output has a place for the frame's number."""
     return bool(scene.arto.output) and bool(_HASHES.search(Path(scene.arto.output).stem))
 
 
 def relit_file(scene: bpy.types.Scene, look: str | None = None) -> Path:
-    """The plate's EXR. look: that it is of (default: the scene's now). Raises SceneError for a
-    .blend that was never saved."""
+    """The path of a plate's EXR. look: the plate's (default: the scene's look now). Raises
+    SceneError where the path depends on a .blend that was never saved."""
     look = scene.arto.look.strip() if look is None else look
     name = relit_name(scene, look)
     mark = f"~{name.rpartition('~')[2]}" if "~" in name else ""
@@ -370,12 +373,12 @@ def relit_file(scene: bpy.types.Scene, look: str | None = None) -> Path:
             path = path / (Path(home.file()).stem or _PLAIN)
         if path.suffix.lower() in _PICTURES:
             path = path.with_suffix(".exr")
-        elif path.suffix.lower() != ".exr":  # a version or a dot of the name's own
+        elif path.suffix.lower() != ".exr":  # The dot belongs to the name, as in `shot.v2`.
             path = path.with_name(path.name + ".exr")
-        # a copied scene has the output of the one it was copied from
+        # A copied scene has the output of its original, so the scene's name tells them apart.
         shared = any(s.arto.output == scene.arto.output for s in bpy.data.scenes if s != scene)
         parts = [*([safe_name(scene.name)] if shared else []), *([_of_look(look)] if look else [])]
-        # hashes are the frame's number, which is what stands last in a name
+        # Hashes stand for the frame's number, which stays last in the name.
         stem, mark, number = path.stem, *_numbered(path.stem, scene.frame_current)
         if mark:
             stem = stem[: mark.start()] + "".join(f"_{part}" for part in parts) + number

@@ -1,7 +1,7 @@
-"""A scene's lasting ID, by which what was captured of it is found when scene or file are renamed.
+"""A scene's lasting ID, by which its captures are found when the scene or the file is renamed.
 
-It is kept in the scene and saved with it. A copy of a scene carries the ID of the one it was copied
-from: it is then whoever had it first in this session that keeps it.
+The ID is a property of the scene and saved with the scene. A copy of a scene carries the ID of its
+original. The scene that had the ID first in this session then keeps it by right.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import uuid
 import bpy
 from bpy.app.handlers import persistent
 
-# By `session_uid`, which stays with a scene over renames and undo: the ID that it was given.
+# The ID that each scene was given, by `session_uid`, which survives renames and undo.
 _given: dict[int, str] = {}
 
 
@@ -21,25 +21,28 @@ def _owner(scene_id: str) -> bpy.types.Scene | None:
     for scene in scenes:
         if _given.get(scene.session_uid) == scene_id:
             return scene
-    # a copy's name is longer, or comes later
+    # No scene is known to have had the ID first. A copy's name is longer or comes later.
     return min(scenes, key=lambda s: (len(s.name), s.name), default=None)
 
 
 def of(scene: bpy.types.Scene) -> str | None:
-    """The scene's ID; None for one that has none yet, or only a copy of another's."""
+    """The scene's ID; None where the scene has no ID yet, or only its original's."""
     found = scene.arto.scene_id
     return found if found and _owner(found) == scene else None
 
 
 def copied_from(scene: bpy.types.Scene) -> bpy.types.Scene | None:
-    """The scene that this one is a copy of, as far as its ID tells."""
+    """The scene that a scene was copied from, as far as the IDs tell; else None."""
     found = scene.arto.scene_id
     owner = _owner(found) if found else None
     return owner if owner != scene else None
 
 
 def give(scene: bpy.types.Scene, scene_id: str | None = None) -> bool:
-    """Give the scene an ID of its own (or that one), unless it has one; whether it was given."""
+    """Give the scene an ID, and return whether an ID was given.
+
+    scene_id: the ID to give; None for a new ID, unless the scene has one of its own already.
+    """
     if scene_id is None and of(scene):
         _given[scene.session_uid] = scene.arto.scene_id
         return False
@@ -50,7 +53,7 @@ def give(scene: bpy.types.Scene, scene_id: str | None = None) -> bool:
 
 @persistent
 def _after_undo(*_: object) -> None:
-    """An undo step from before the ID was given takes it away: the scene gets it back."""
+    """Give scenes their IDs back: undo takes an ID away where its step is older than the ID."""
     for scene in bpy.data.scenes:
         given = _given.get(scene.session_uid)
         if given and scene.arto.scene_id != given:

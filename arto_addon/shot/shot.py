@@ -1,4 +1,4 @@
-"""Which picture of which scene Blender is about to render: the core's `Shot` of a scene."""
+"""Make the core's `Shot`, which says what picture of what scene Blender is about to render."""
 
 from __future__ import annotations
 
@@ -25,7 +25,10 @@ def layer_of(scene: bpy.types.Scene) -> str:
 def shot_of(
     scene: bpy.types.Scene, view_layer: str | None = None, region: Region | None = None
 ) -> Shot:
-    """The scene's shot as it stands. Changes nothing, and evaluates nothing."""
+    """Make the shot of a scene as the scene is now; the scene is neither changed nor evaluated.
+
+    view_layer: default: `layer_of`; region: default: what the scene renders of its picture.
+    """
     width, height = picture_size(scene)
     camera = scene.camera
     region = region or picture_region(scene)
@@ -51,7 +54,7 @@ def _matrix(camera: bpy.types.Object) -> tuple[float, ...]:
 
 
 def _lens(scene: bpy.types.Scene) -> tuple[object, ...]:
-    """What of the camera decides the framing, beside where it stands."""
+    """The settings of camera and render that decide the framing, without the camera's place."""
     if not scene.camera or scene.camera.type != "CAMERA":
         return ()
     lens, render = scene.camera.data, scene.render
@@ -64,9 +67,10 @@ def _lens(scene: bpy.types.Scene) -> tuple[object, ...]:
 
 
 def check_same_shot(scene: bpy.types.Scene, then: Shot | None, what: str, view_layer: str) -> None:
-    """Raise CaptureSetError where `what` is of another shot than the scene's.
+    """Raise CaptureSetError where a file is of another shot than the scene's.
 
-    then: the shot that it says it is of; None where it does not say.
+    then: the shot that the file names; None where the file names no shot, which is no error. what:
+    names the file in the error.
     """
     if then is None:
         return

@@ -1,4 +1,4 @@
-"""What there is of a shot, in a line, for the panel: its capture set, its reflectance field."""
+"""The state of a shot's capture set and of its reflectance field, each in a line for the panel."""
 
 from __future__ import annotations
 
@@ -20,16 +20,18 @@ from .fingerprint import changes
 from .paths import Place
 from .shot import check_same_shot, layer_of
 
-# A panel is drawn with every move of the mouse; a description is read when it has changed.
+# A panel is drawn with every move of the mouse, so a description is read only when its file has
+# changed. By the description's path: the time of the file, and what the description describes.
 _read: dict[Path, tuple[int, CaptureSet | Field | None]] = {}
 
-Line = tuple[str, bool]  # what to say, and whether it serves the shot as it is
+Line = tuple[str, bool]  # What to say, and whether the files can be used for the shot as it is now.
 
 
 def _opened(kind: type, path: Path, **options: Any) -> Any:
-    """What a description describes, None where it is damaged or of another version.
+    """Open a capture set or field by the path of its description.
 
-    Raises OSError where it is not there.
+    None where the description is damaged or of another version. Raises OSError where it is not
+    there.
     """
     changed = path.stat().st_mtime_ns
     if path not in _read or _read[path][0] != changed:
@@ -49,7 +51,7 @@ def _place(scene: bpy.types.Scene, view_layer: str | None) -> Place | None:
 
 
 def unfinished(folder: Path) -> list[str]:
-    """The captures in a shot's folder that were stopped, the newest first: `2 of 7 tiles`."""
+    """Say how far each stopped capture in a shot's folder is, as `2 of 7 tiles`, newest first."""
     found = []
     for path in folder.glob("unfinished-*/" + HEADER):
         try:
@@ -63,7 +65,7 @@ def unfinished(folder: Path) -> list[str]:
 
 
 def capture_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line | None:
-    """What there is of a capture, and whether it serves the shot as it is; None for nothing."""
+    """Say what capture a shot has, and whether the shot as it is now can use it; None without."""
     place = _place(scene, view_layer)
     if place is None:
         return None
@@ -74,7 +76,7 @@ def capture_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line 
         return there
     stopped = unfinished(place.source)
     if there is None and stopped:
-        # whether Capture goes on with it hangs on every setting
+        # Whether Capture would go on with it depends on all settings, so the line does not say.
         return f"unfinished, {stopped[0]}", False
     if there is None:
         other = _nearest(scene, view_layer, place)
@@ -83,12 +85,13 @@ def capture_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line 
     return _of_this_shot(scene, view_layer, there.head.shot, there.head.fingerprint, text)
 
 
-# By the shot's own folder, for a panel that is drawn often: when it was looked for, and found.
+# By the shot's own folder: when another shot was looked for, and the shot that was found. A panel
+# is drawn often, so the search is not repeated each time.
 _others: dict[Path, tuple[float, Shot | None]] = {}
 
 
 def _nearest(scene: bpy.types.Scene, view_layer: str | None, place: Place) -> Shot | None:
-    """Another shot of the scene, where nothing was captured of this one."""
+    """Find another captured shot of the scene, for a shot of which nothing was captured."""
     at, found = _others.get(place.folder, (-2.0, None))
     if bpy.app.background or time.monotonic() - at > 1:
         found = paths.nearest(scene, view_layer)
@@ -97,7 +100,7 @@ def _nearest(scene: bpy.types.Scene, view_layer: str | None, place: Place) -> Sh
 
 
 def caution_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line | None:
-    """What the check of the light found before the capture; None for nothing."""
+    """Say what the check of the light found before the capture; None where it found nothing."""
     place = _place(scene, view_layer)
     there = _capture_set(place) if place and not place.owner else None
     caution = there.head.caution if isinstance(there, CaptureSet) else None
@@ -113,7 +116,7 @@ def _capture_set(place: Place) -> CaptureSet | Line | None:
 
 
 def capture_at(header: Path) -> CaptureSet | None:
-    """The capture set whose description that is; None where it is not there, or damaged."""
+    """Open the capture set with this description; None where it is missing or damaged."""
     try:
         return _opened(CaptureSet, header, unfinished=True)
     except OSError:
@@ -121,7 +124,7 @@ def capture_at(header: Path) -> CaptureSet | None:
 
 
 def field_of(source: Path) -> Field | None:
-    """The field in a shot's folder; None where it is not there, or damaged."""
+    """Open the field in a shot's folder; None where it is missing or damaged."""
     try:
         return _opened(Field, source / "field" / FIELD_HEADER)
     except OSError:
@@ -132,7 +135,7 @@ _sizes: dict[Path, tuple[float, int]] = {}
 
 
 def disk(folder: Path) -> int:
-    """Bytes in a folder, looked at once every few seconds; 0 where it is not there."""
+    """Count the bytes in a folder, anew every three seconds; 0 where there is no such folder."""
     at, found = _sizes.get(folder, (-10.0, 0))
     if bpy.app.background or time.monotonic() - at > 3:
         found = sum(f.stat().st_size for f in folder.rglob("*") if f.is_file())
@@ -141,7 +144,7 @@ def disk(folder: Path) -> int:
 
 
 def field_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line | None:
-    """What there is of a field, and whether it serves the shot as it is; None for nothing."""
+    """Say what field a shot has, and whether the shot as it is now can use it; None without."""
     place = _place(scene, view_layer)
     if place is None or place.owner:
         return None
@@ -152,7 +155,7 @@ def field_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line | 
         return None
     if there is None:
         return "damaged, or of another version: fit again", False
-    captured = _capture_set(place)  # which a field does not need any more
+    captured = _capture_set(place)  # A field works without its capture set, which may be gone.
     if isinstance(captured, CaptureSet):
         keys = there.about.key, captured.head.key
         if keys[0] != keys[1]:
@@ -168,7 +171,10 @@ def _of_this_shot(
     then: Mapping[str, str] | None,
     text: str,
 ) -> Line:
-    """What to say of what a shot and a fingerprint are of: `text`, where they are the scene's."""
+    """Compare a capture with the scene as it is now, and say what differs, or `text`.
+
+    shot, then: the capture's shot and fingerprint.
+    """
     layer = view_layer or layer_of(scene)
     try:
         check_same_shot(scene, shot, "it", layer)
@@ -187,10 +193,10 @@ def changed_since(
     then: Mapping[str, str] | None,
     now: bool = False,
 ) -> list[str]:
-    """What of the scene has changed since a capture, in words, the most telling first.
+    """List in words what has changed in the scene since a capture, the most telling first.
 
-    then: the capture's fingerprint; now: look now; else, in the window, the answer is that of the
-    last look after a change.
+    then: the capture's fingerprint; now: compare with the scene as it is now. Otherwise the window
+    answers with its last look, and the list is empty before the first look.
     """
     if then is None:
         return []

@@ -1,8 +1,8 @@
-"""Every value of a data-block as bytes, and the data-blocks that it points to.
+"""Read every value of a data-block as bytes, and find the data-blocks that it points to.
 
-It goes over what Blender says that a data-block has, not over a list, so that new settings of a new
-Blender are met too. What only the artist's screen shows (selection, colours of nodes, what is
-folded) is passed by.
+Blender itself lists the properties of a data-block, so settings that a new Blender adds are read as
+well. Properties that only change the artist's screen are left out: selection, colours of nodes,
+folded panels.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ def _names(text: str) -> set[str]:
     return set(text.split())
 
 
-# Blender's own and ours, and what changes by being looked at.
+# Properties of Blender's or ARTO's bookkeeping, and properties that change when they are read.
 _NEVER = _names("""
     rna_type name name_full original session_uid users tag is_evaluated use_fake_user
     use_extra_user preview asset_data override_library library library_weak_reference
     animation_data id_data update_tag runtime_flag annotation grease_pencil bindcode depsgraph
     pixels execution_time persistent_uid is_runtime_data filepath_raw arto
 """)
-# Of an editor and not of the picture.
+# Properties of an editor, which do not change the picture.
 _SCREEN = _names("""
     select hide hide_select hide_viewport display display_type display_size empty_display_size
     empty_display_type lineart track_axis up_axis lock_location lock_rotation lock_scale
@@ -51,7 +51,7 @@ _NODES_OWN = {
     "location", "location_absolute", "width", "height", "dimensions", "color", "use_custom_color",
     "label", "parent", "warning_propagation", "internal_links",
 }  # fmt: skip
-# A transform is told by its channels; these are worked out from them.
+# A transform is read by its channels (location, rotation, scale). These follow from the channels.
 _DERIVED = {
     "matrix_world",
     "matrix_local",
@@ -61,12 +61,12 @@ _DERIVED = {
     "head",
     "tail",
 }
-# Data-blocks that a picture's objects may point to without being made of them.
+# Kinds of data-blocks that objects may point to, and of which a render of the objects is not made.
 _OTHERS = (
     bpy.types.Scene, bpy.types.World, bpy.types.Action, bpy.types.Text, bpy.types.Library,
     bpy.types.Screen, bpy.types.WorkSpace, bpy.types.WindowManager, bpy.types.Brush,
 )  # fmt: skip
-# Their values are arrays, read as such.
+# Collections whose values are large arrays. `arrays` and `shape_keys` read them.
 _ARRAYS = _names("""
     vertices edges loops polygons loop_triangles attributes uv_layers color_attributes points
     vertex_normals polygon_normals corner_normals skin_vertices curve_offset_data curves data
@@ -77,13 +77,15 @@ _ARRAY_OWNERS = (
 )  # fmt: skip
 
 
-# Custom properties of other data-blocks are of no use to a shader.
+# A shader can read custom properties of these kinds of data-blocks only.
 _CUSTOM = (bpy.types.Object, bpy.types.Mesh, bpy.types.Material, bpy.types.Camera, bpy.types.Light)
 
 
 class Walk:
-    """One data-block's digest, and what it points to. passed: what of it does not count, by pointer
-    and type."""
+    """The digest of a data-block, and in `found` the data-blocks that it points to.
+
+    passed: parts of the data-block that do not count, by pointer and type.
+    """
 
     def __init__(self, block: bpy.types.ID, passed: Iterable[tuple[int, type]] = ()) -> None:
         self._hash = hashlib.blake2b(digest_size=12)
@@ -99,7 +101,7 @@ class Walk:
         self._hash.update(repr(values).encode("utf-8", "surrogatepass"))
 
     def _struct(self, value: Any, depth: int) -> None:
-        # a socket knows its node, which knows its sockets: each once
+        # A socket points to its node, and the node to its sockets. So each is read only once.
         key = value.as_pointer(), type(value)
         if key in self._seen:
             return
@@ -119,7 +121,7 @@ class Walk:
             elif kind == "FLOAT":
                 self._put(name, round(item, 6))
             elif kind == "PATH":
-                # where a file is changes with the .blend's own place; which one it is does not
+                # A file's folder may change when the .blend moves, so only the file's name counts.
                 self._put(name, item.replace("\\", "/").rpartition("/")[2])
             else:
                 self._put(name, sorted(item) if isinstance(item, set) else _plain(item))
@@ -127,7 +129,7 @@ class Walk:
             self._custom(value)
 
     def _custom(self, value: Any) -> None:
-        """Custom properties: drivers and Attribute nodes read them, modifiers keep inputs there."""
+        """Read custom properties, as drivers, Attribute nodes and modifiers depend on them."""
         try:
             names = sorted(value.keys())
         except (TypeError, AttributeError):
@@ -200,7 +202,7 @@ def _properties(kind: type, rna: Any) -> list[tuple[str, str, bool]]:
         for prop in rna.properties:
             name = prop.identifier
             pointing = prop.type in {"POINTER", "COLLECTION"}
-            # a name that is chosen of a list is no name: the colour space of an image
+            # A name that is chosen from a list is a setting: the colour space of an image.
             chosen = name == "name" and prop.type == "ENUM"
             if (name in _NEVER and not chosen) or name in _SCREEN or name in _DERIVED:
                 continue
@@ -216,16 +218,16 @@ def _properties(kind: type, rna: Any) -> list[tuple[str, str, bool]]:
 
 
 def checksum(values: np.ndarray) -> bytes:
-    """Tells a change, and not who made it: so a checksum does, five times as fast as a hash."""
+    """A checksum of an array, which is enough to see a change, and five times as fast as a hash."""
     return zlib.crc32(values).to_bytes(4, "little")
 
 
 def arrays(data: Any) -> str:
-    """The digest of a geometry's arrays: mesh, hair curves, point cloud."""
+    """The digest of the arrays of a mesh, hair curves or a point cloud."""
     out = hashlib.blake2b(digest_size=12)
     for attribute in data.attributes:
         name = attribute.name
-        # a corner's edge follows from the vertices
+        # The edge of a corner follows from the vertices.
         if name.startswith(_EDITING) or name == ".corner_edge":
             continue
         out.update(f"{name} {attribute.domain} {attribute.data_type}".encode())
@@ -237,7 +239,7 @@ def arrays(data: Any) -> str:
         attribute.data.foreach_get(field, values)
         out.update(checksum(values))
     if isinstance(data, bpy.types.Mesh):
-        # where the faces begin among the same corners takes longer to read than all the rest
+        # Only counts: where each face begins takes longer to read than all the rest together.
         out.update(repr((len(data.polygons), len(data.loops))).encode())
     elif isinstance(data, bpy.types.Curves):
         starts = np.empty(len(data.curve_offset_data), np.int32)
@@ -264,7 +266,7 @@ _FIELDS: dict[str, tuple[str, int, type]] = {
 
 
 def shape_keys(keys: bpy.types.Key) -> str:
-    """The digest of a shape key's points."""
+    """The digest of the points of all shape keys."""
     out = hashlib.blake2b(digest_size=12)
     for block in keys.key_blocks:
         values = np.empty(len(block.data) * 3, np.float32)
@@ -274,15 +276,16 @@ def shape_keys(keys: bpy.types.Key) -> str:
     return out.hexdigest()
 
 
-# Of files: (path, size, time) -> digest of what is in them.
+# Digests of the contents of files, by path, size, both times and inode.
 _contents: dict[tuple[str, int, int, int, int], str] = {}
 
 
 def image(block: bpy.types.Image, then: str = "", full: bool = False) -> str:
-    """The digest of an image: what is painted or made, else what is packed, else its file.
+    """The digest of an image: of its painted or generated pixels, else of packed data or the file.
 
-    then: the digest that it is going to be compared with; a file that has another time and the same
-    size is then read, and has that digest if nothing in it has changed. full: read it in any case.
+    then: the digest that the new one will be compared with. A file with a new time and the same
+    size is read. If its contents are the same, the answer is `then`. full: read the file in any
+    case.
     """
     out = hashlib.blake2b(digest_size=12)
     if block.is_dirty or (block.source == "GENERATED" and not block.packed_file):
@@ -298,11 +301,11 @@ def image(block: bpy.types.Image, then: str = "", full: bool = False) -> str:
 
 
 def file(path: str, library: bpy.types.Library | None, then: str = "", full: bool = False) -> str:
-    """The digest of a file, `size:time:digest of what is in it`; see `image`."""
+    """The digest of a file: `size:time:digest of the contents`. then, full: see `image`."""
     if not path:
         return "none"
     try:
-        # by the file that is open: in a copy, Blender has turned the paths of data-blocks
+        # Relative to the open file: Blender adapts relative paths when it saves a copy elsewhere.
         there = Path(bpy.path.abspath(path, library=library))
         stat = there.stat()
         size, at = stat.st_size, stat.st_mtime_ns
@@ -311,13 +314,14 @@ def file(path: str, library: bpy.types.Library | None, then: str = "", full: boo
         if not (full or touched):
             same = was if was[:2] == [str(size), str(at)] else ["", "", ""]
             return f"{size}:{at}:{same[2]}"
-        # a copy may have the time and the size of what it replaces, but not these two as well
+        # A file that replaces another may have the same size and time, but never also the same
+        # ctime and inode.
         key = str(there), size, at, stat.st_ctime_ns, stat.st_ino
         if key not in _contents:
             with there.open("rb") as f:
                 _contents[key] = hashlib.file_digest(
                     f, lambda: hashlib.blake2b(digest_size=12)
                 ).hexdigest()
-    except OSError as e:  # it is not there: that is its state
+    except OSError as e:  # The file cannot be read, and the digest says so.
         return f"{Path(path).name} {type(e).__name__}"
     return then if touched and was[2] == _contents[key] else f"{size}:{at}:{_contents[key]}"

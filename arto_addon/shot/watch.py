@@ -1,4 +1,4 @@
-"""Keeps the scene's fingerprint up to date: worked out after a change, never while drawing."""
+"""Keep the scene's fingerprint up to date: it is made after a change, never while drawing."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from bpy.app.handlers import persistent
 from . import fingerprint as prints
 from .fingerprint import Fingerprint
 
-# After a change, so much time without another before it is looked at.
+# Seconds without a change before the scene is looked at.
 REST = 0.3
 _latest: dict[tuple[int, str], Fingerprint] = {}
 _asked: dict[tuple[int, str], Fingerprint] = {}
@@ -18,13 +18,14 @@ _stale: set[tuple[int, str]] = set()
 def latest(
     scene: bpy.types.Scene, view_layer: str, then: Fingerprint, now: bool
 ) -> Fingerprint | None:
-    """The fingerprint of a view layer, None where it is not known yet (then it soon will be).
+    """The latest fingerprint of a view layer; None where it is still being made.
 
-    then: what it is going to be compared with; now: work it out here, which takes a while.
+    then: the fingerprint that the latest will be compared with; now: make the fingerprint before
+    returning, which takes a while.
     """
     key = scene.session_uid, view_layer
     if now:
-        prints.forget()  # nobody tells of changes in batch
+        prints.forget()  # Without a window, no handler has noted what changed.
         return prints.fingerprint(scene, view_layer, then)
     if key not in _asked or _asked[key] is not then:
         _asked[key] = then
@@ -34,14 +35,14 @@ def latest(
 
 
 def _look_soon() -> None:
-    # again from the beginning where it waits already: nothing is looked at in the middle of a drag
+    # A timer that runs already starts again, so that nothing is looked at in the middle of a drag.
     if bpy.app.timers.is_registered(_look):
         bpy.app.timers.unregister(_look)
     bpy.app.timers.register(_look, first_interval=REST)
 
 
 def _look() -> float | None:
-    """Work out what is stale, once nothing else is going on; redraw what shows it."""
+    """Make stale fingerprints anew and redraw the panels, once no animation or render runs."""
     manager = bpy.context.window_manager
     if any(w.screen.is_animation_playing for w in manager.windows):
         return REST
@@ -62,7 +63,7 @@ def _look() -> float | None:
 
 
 def redraw() -> None:
-    """Draw again what shows ARTO's panels."""
+    """Redraw all areas that may show ARTO's panels."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type in {"PROPERTIES", "VIEW_3D", "IMAGE_EDITOR", "NODE_EDITOR"}:
@@ -73,8 +74,8 @@ def redraw() -> None:
 def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if not _asked:
         return
-    # what hangs on a mesh is named with it: its data, whose arrays are kept, and the object, whose
-    # deformed shape is
+    # Digests are kept of a mesh's arrays, of its shape keys, and of its object's deformed shape. A
+    # change of geometry makes all of them stale.
     geometry = set()
     for update in depsgraph.updates:
         if update.is_updated_geometry:
@@ -93,7 +94,7 @@ def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 @persistent
 def _all_changed(*_: object) -> None:
-    """After undo, redo, a saved or another file: look again, at everything that may be another."""
+    """Look at everything again, after undo, redo, or another file."""
     prints.forget()
     scenes = {s.session_uid for s in bpy.data.scenes}
     for kept in (_latest, _asked):
@@ -115,7 +116,7 @@ _HANDLERS = {
 
 def register() -> None:
     if bpy.app.background:
-        return  # nothing is drawn: whoever asks has it worked out
+        return  # Without a window nothing is drawn, and `latest` makes the fingerprint itself.
     for name, handler in _HANDLERS.items():
         getattr(bpy.app.handlers, name).append(handler)
 
