@@ -1,4 +1,4 @@
-"""Back to the scene: a mix found in the compositor, as a world and lamps to render with."""
+"""Back to the scene: turn the mix set in the compositor into a world and lamps to render with."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ WORLD = "ARTO Mix"
 
 @dataclass(frozen=True)
 class Mix:
-    """What a mixer's node does: by layer its gain times its tint, (3,); exposure: in stops."""
+    """What a mixer's node does to each layer. exposure: of all layers, in stops."""
 
     node: bpy.types.Node
     exposure: float
 
     def of(self, layer: str) -> NDArray[np.float64]:
-        """(3,), 1 for what is no layer of the mixer's."""
+        """The factor of a layer, (3,): gain, tint and exposure; for others the exposure alone."""
         inputs = self.node.inputs
         if layer not in inputs:
             return np.full(3, 2.0**self.exposure)
@@ -46,8 +46,11 @@ class Mix:
 
 
 def mix_of(scene: bpy.types.Scene) -> Mix:
-    """The mix in the scene's compositor. Raises SceneError where there is none, or where something
-    is linked to its sockets, which a lamp cannot follow."""
+    """The mix in the scene's compositor.
+
+    Raises SceneError where there is no mixer, or where a socket other than Footage is linked: a
+    lamp cannot follow a link.
+    """
     tree = compositor(scene)
     for node in tree.nodes if tree else ():
         group = getattr(node, "node_tree", None)
@@ -65,11 +68,11 @@ def mix_of(scene: bpy.types.Scene) -> Mix:
 
 
 def mix_to_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> Path:
-    """Give the scene a world and lamps that render as the mix in its compositor looks; returns the
-    environment map that was written for it.
+    """Give the scene a world and lamps that render as the mix in its compositor looks.
 
-    The world is a new one; the lamps' energy and colour are multiplied, which can be undone in the
-    window. Raises SceneError, and what opening the field raises.
+    The world is a new one. The energy and colour of the lamps are multiplied, which the window can
+    undo. Returns the path of the new world's environment map. Raises SceneError, and what opening
+    the field raises.
     """
     layer = view_layer or layer_of(scene)
     mix, settings = mix_of(scene), scene.arto
@@ -89,7 +92,7 @@ def mix_to_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> Path:
         gain = mix.of(layers.channel_name(scene, name))
         image += part_of(whole, share).image * gain.astype(np.float32)
         left -= share
-    # light from where no patch is: seen, though it lights nothing
+    # light from where no patch is lights nothing, but the camera sees it
     image += whole.image * np.maximum(left, 0)[..., None] * np.float32(2.0**mix.exposure)
     path = world_file(path)
     exr.write(path, {"": image}, None, working_space())
@@ -100,7 +103,7 @@ def mix_to_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> Path:
 
 
 def _layer_of(scene: bpy.types.Scene, thing: bpy.types.Object) -> str:
-    """The layer that a lamp is in."""
+    """The name of the layer that holds a lamp's light."""
     groups = {g.name for layer in scene.view_layers for g in layer.lightgroups}
     name = layers.OWN + (f"_{safe_name(thing.lightgroup)}" if thing.lightgroup in groups else "")
     return layers.channel_name(scene, name)
@@ -111,7 +114,7 @@ def _lamps(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 
 def _check_lamps(scene: bpy.types.Scene, mix: Mix) -> None:
-    """Raise SceneError where a lamp would have to change that cannot."""
+    """Raise SceneError where the mix changes a linked lamp: ARTO cannot edit it."""
     for thing in _lamps(scene):
         gain = scene.arto.own_lamps * mix.of(_layer_of(scene, thing))
         if thing.data.library and not np.allclose(gain, 1):
@@ -123,10 +126,10 @@ def _gain_lamps(scene: bpy.types.Scene, mix: Mix) -> None:
     gained: dict[str, dict[Any, NDArray]] = {}
     for thing in _lamps(scene):
         if thing.data.library:
-            continue  # which stays as it is, see `_check_lamps`
+            continue  # a linked lamp stays as it is: `_check_lamps` has found its gain to be 1
         name = _layer_of(scene, thing)
         if any(thing.data in lamps for other, lamps in gained.items() if other != name):
-            # shared with a lamp of another layer
+            # lamps of two layers share this data: give this lamp a copy, with its own gain
             thing.data = thing.data.copy()
         gained.setdefault(name, {})[thing.data] = scene.arto.own_lamps * mix.of(name)
     for lamps in gained.values():
@@ -138,7 +141,7 @@ def _gain_lamps(scene: bpy.types.Scene, mix: Mix) -> None:
 
 
 def _world_showing(path: Path, turn: float) -> bpy.types.World:
-    """A world that shows a map, turned."""
+    """A world that shows a map from a file. turn: about the vertical, in radians."""
     world = bpy.data.worlds.get(WORLD) or new_world(WORLD)
     tree = world.node_tree
     tree.nodes.clear()

@@ -1,4 +1,4 @@
-"""The files of a relight: which of them the settings ask for, and what stands in their headers."""
+"""The files of a relight: which files the settings ask for, and what their headers say."""
 
 from __future__ import annotations
 
@@ -18,8 +18,11 @@ from .shown import Ready, Shown
 
 @dataclass(frozen=True)
 class Made:
-    """What a relight has made. picture: (H, W, 4), the plate; things: (H, W, 3), it without the
-    world behind; caught: of a shot with shadow catchers."""
+    """What a relight has made.
+
+    picture: the plate, (H, W, 4); things: the plate without the world behind, (H, W, 3); caught:
+    the shadows, for a shot with shadow catchers only.
+    """
 
     picture: NDArray[np.float32]
     things: NDArray[np.float32]
@@ -27,9 +30,9 @@ class Made:
 
 
 def write(shown: Shown, ready: Ready, made: Made, about: dict[str, str]) -> Steps:
-    """Write the plate and what the settings want beside it.
+    """Write the plate and the files that the settings ask for beside it.
 
-    about: what the headers begin with. Raises SceneError, ExrError.
+    about: the first entries of each header. Raises SceneError, ExrError.
     """
     scene, path, picture, caught = shown.scene, ready.lit.path, made.picture, made.caught
     settings = scene.arto
@@ -75,7 +78,7 @@ def write(shown: Shown, ready: Ready, made: Made, about: dict[str, str]) -> Step
 def _into_footage(
     shown: Shown, ready: Ready, caught: Caught, about: dict[str, str]
 ) -> Iterator[Progress]:
-    """Write the things in the artist's footage, where there is some."""
+    """Write the picture of the things over the artist's footage, where the scene has footage."""
     found = shown.filmed()
     if found is None:
         return

@@ -26,7 +26,7 @@ IMAGE, FROM = "ARTO Inside", "ARTO Light From"
 SIDE = 192
 # How far around a place on the HDRI its light is shown, in radians.
 REACH = math.radians(12)
-# Faces as an artist says them, and the HDRI's suns.
+# The hemicube's faces, the HDRI's suns and the other lights in an artist's words.
 _WORDS = {
     "top": "the top", "bottom": "below", "left": "the left", "right": "the right",
     "back": "the back", "front": "the front", "suns": "the HDRI's suns",
@@ -42,7 +42,7 @@ _PLACES = {
 
 @dataclass(frozen=True)
 class Seen:
-    """What a look inside found: sentences, and the unfolded hemicube, (h, w, 4)."""
+    """What a look inside found: sentences, and a picture of the unfolded hemicube, (h, w, 4)."""
 
     lines: tuple[str, ...]
     picture: NDArray[np.float32]
@@ -56,9 +56,10 @@ def environment_of(scene: bpy.types.Scene) -> Environment:
 
 
 def look(scene: bpy.types.Scene, x: int, y: int) -> Seen:
-    """Where the light of the plate's pixel x, y comes from; from the left and the top.
+    """Find where the light of a pixel of the plate comes from.
 
-    Raises SceneError, FieldError where nothing was captured there.
+    x, y: the pixel, counted from the left and the top. Raises SceneError, and FieldError where
+    nothing was captured at this pixel.
     """
     layer = layer_of(scene)
     shown = Shown(scene, layer)
@@ -96,7 +97,7 @@ def look(scene: bpy.types.Scene, x: int, y: int) -> Seen:
 
 
 def _pieces(shown: Shown, environment: Environment) -> dict[str, NDArray]:
-    """The environment by faces, its suns apart; the shares sum to 1."""
+    """The shares of the environment: a share for each face, and one for the suns. They sum to 1."""
     field = shown.field
     found = split(environment, field.hemicube)
     sun = found.lamps.image.sum(axis=-1)
@@ -109,10 +110,11 @@ def _pieces(shown: Shown, environment: Environment) -> dict[str, NDArray]:
 
 
 def direction_at(scene: bpy.types.Scene, name: str, u: float, v: float) -> NDArray | None:
-    """The direction that a place of a picture shows; u, v from its left and bottom, 0 to 1.
+    """The direction in the scene that a place of a picture shows.
 
-    name: of the picture: `IMAGE`, else an HDRI that the scene's world shows as it is turned now.
-    None beside the unfolded hemicube.
+    name: the picture's, either `IMAGE` or the HDRI of the scene's world, taken as turned now; u, v:
+    the place, from the left and the bottom, 0 to 1. None where the place is beside the unfolded
+    hemicube.
     """
     if name == IMAGE:
         shown = Shown(scene, layer_of(scene))
@@ -128,7 +130,7 @@ def direction_at(scene: bpy.types.Scene, name: str, u: float, v: float) -> NDArr
 
 
 def light_from(scene: bpy.types.Scene, direction: NDArray) -> tuple[NDArray[np.float32], str]:
-    """What the light around a direction gives to the picture -> (H, W, 4), and a sentence.
+    """Show what the light around a direction gives to the picture -> (picture (H, W, 4), sentence).
 
     Raises SceneError, FieldError.
     """
@@ -141,7 +143,7 @@ def light_from(scene: bpy.types.Scene, direction: NDArray) -> tuple[NDArray[np.f
     some = relight(shown.field, PatchLight(part_of(environment, share), hemicube), 0.0)
     every = relight(shown.field, PatchLight(environment, hemicube), 0.0)
     whole = float(every[..., :3].sum(dtype=np.float64))
-    # a plane laid through a bright spot undershoots beside it
+    # the plane fitted through a bright spot falls below 0 beside the spot
     some[..., :3] = np.maximum(some[..., :3], 0)
     part = float(some[..., :3].sum(dtype=np.float64)) / whole if whole else 0.0
     place = f"azimuth {math.degrees(azimuth):.0f}°, elevation {math.degrees(elevation):.0f}°"

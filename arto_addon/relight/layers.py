@@ -1,7 +1,8 @@
-"""Layers of a plate: what each part of the world's light, its lamps and the scene's own give to it.
+"""Layers of a plate: what each part of the light adds to the picture.
 
-They are written beside the plate, in one file that compositing programs open or in one each, and
-stand in a node group of Blender's compositor with a gain and a tint for each.
+The parts are cut from the world's light; the scene's own lamps have layers too. The layers are
+written beside the plate, all in one file or each in its own file. A node group in Blender's
+compositor has a gain and a tint for each layer.
 """
 
 from __future__ import annotations
@@ -41,18 +42,18 @@ from ..world.lamp_render import lamp_light, lamp_samples
 from ..world.own import gains_of
 from .shown import Ready, Shown
 
-# The layers of no part of the world's light: the scene's own lamps, and the world that is seen.
+# Layers besides the parts of the world's light: the scene's own lamps, and the world behind.
 OWN, BEHIND = "own", "behind"
-# What else a mixer has sockets of, which an empty prefix lets a group be called.
+# Other sockets of a mixer. With an empty prefix a group could be given one of these names.
 SOCKETS = {"Exposure", "Footage", "Image", "Combined", "Alpha"}
-# A part of the light with less than this share of the lamps has none of them.
+# A part of the light with less than this share of the lamps' light is given no lamps.
 LEAST_LAMPS = 1e-4
 # The largest number that a half float holds.
 HALF = 65504.0
 
 
 def _check(scene: bpy.types.Scene) -> None:
-    """Raise SceneError where two layers would have one name, or a name that is the mixer's own."""
+    """Raise SceneError where two layers share a name, or a layer is named as a mixer's socket."""
     taken = {channel_name(scene, name) for name in (REST, OWN, BEHIND)} | SOCKETS
     for group in scene.arto.groups:
         name = channel_name(scene, group.name)
@@ -64,14 +65,14 @@ def _check(scene: bpy.types.Scene) -> None:
 def parts_of(
     scene: bpy.types.Scene, environment: Environment, field: Field, world: bpy.types.World
 ) -> dict[str, NDArray[np.float32]]:
-    """The shares (H, W) of an environment that the artist's settings cut it into; they sum to 1.
+    """Cut an environment into the parts that the settings ask for -> shares (H, W), which sum to 1.
 
-    world: that it is of, for masks that are painted on its HDRI.
+    world: the world that the environment is of; masks are painted on its HDRI.
     """
     settings = scene.arto
     if settings.layers == "FACES":
         found = by_faces(environment, field.hemicube)
-        # light from where no face is lights nothing: no layer has it
+        # light from where no face is lights nothing, so no layer is made for it
         return {k: v for k, v in found.items() if v.any()}
     _check(scene)
     masks = {}
@@ -90,7 +91,7 @@ def parts_of(
 def pictures_of(
     field: Field, environment: Environment, parts: dict[str, NDArray[np.float32]]
 ) -> dict[str, NDArray[np.float32]]:
-    """What each part of an environment gives to a field's picture, (H, W, 3), by its name."""
+    """What each part of an environment adds to a field's picture, (H, W, 3), by part."""
     out: dict[str, NDArray[np.float32]] = {}
     names = list(parts)
     most = together(field)
@@ -103,7 +104,7 @@ def pictures_of(
 
 
 def lamp_shares(lamps: Environment, parts: dict[str, NDArray[np.float32]]) -> dict[str, float]:
-    """How much of the lamps' light each part has, of those that have some."""
+    """The share of the lamps' light in each part; parts with almost none are left out."""
     weights = lamps.image.sum(axis=-1, dtype=np.float64) * lamps.row_solid_angles[:, None]
     total = float(weights.sum())
     found = {name: float((weights * share).sum()) / total for name, share in parts.items()}
@@ -111,8 +112,11 @@ def lamp_shares(lamps: Environment, parts: dict[str, NDArray[np.float32]]) -> di
 
 
 def of_plate(shot: Shown, ready: Ready) -> Steps:
-    """The layers of a plate, (H, W, 3) each, by name, denoised where the plate is; of a shot with
-    shadow catchers, of its things alone."""
+    """Make the layers of a plate, (H, W, 3) each, by name.
+
+    They are denoised where the plate is. For a shot with shadow catchers, the layers show the
+    things without the catchers.
+    """
     shown, rendered = shot.takes[-1], ready.rendered[-1]
     parts = parts_of(shown.scene, ready.whole, shown.field, ready.world)
     scene, field = shown.scene, shown.field
@@ -136,7 +140,7 @@ def of_plate(shot: Shown, ready: Ready) -> Steps:
             gain = np.float32(gains.get(name.removeprefix("own_"), 1.0))
             found[name] = scale * gain * field.layer(name)
             left = left - field.layer(name)
-        # of no group; what is left of sums by rounding is nothing
+        # lamps in no light group: what the groups leave over, but for what is rounding
         found[OWN] = scale * np.where(left > 1e-5 * own, left, 0)
     if scene.arto.denoise and denoise.available():
         for name, picture in found.items():
@@ -153,8 +157,11 @@ def write(
     attributes: dict[str, object],
     space: str,
 ) -> Steps:
-    """Write layers that sum to a plate (H, W, 4), and it; says how far their sum is off. Raises
-    SceneError, ExrError."""
+    """Write the layers of a plate: all with the plate in one file, or each in a file of its own.
+
+    beauty: the plate, (H, W, 4). The last message says by how much the sum of the layers differs
+    from the plate. Raises SceneError, ExrError.
+    """
     settings = scene.arto
     names = [channel_name(scene, name) for name in layers]
     each = settings.layers_files == "EACH"
@@ -177,7 +184,7 @@ def write(
     together = layers_file(path)
     if not each:
         exr.write_layered(together, picture, named, attributes, space, window)
-    # the mixer shows all of them from one file, and all of their pixels
+    # the mixer reads all layers and all their pixels from one file
     whole = shown_file(together, attributes)
     if window.crop if not each else path == paths.relit_file(scene):
         full = replace(window, crop=False)
@@ -186,8 +193,10 @@ def write(
 
 
 def layer_files(path: Path, names: list[str]) -> dict[str, Path]:
-    """Where layers of these names are, beside a plate, if each is a file. Raises SceneError where
-    one would be written over another file."""
+    """The path of each layer's own file beside a plate, by name.
+
+    Raises SceneError where the file of a layer would overwrite another file.
+    """
     beside = (share_file, light_file, layers_file, data_file, comp_file, world_file)
     others = [path, *(name(path) for name in beside)]
     taken = {file.name.lower() for one in others for file in (one, full_file(one))}
@@ -206,16 +215,16 @@ def layer_files(path: Path, names: list[str]) -> dict[str, Path]:
 
 
 def prefix_of(scene: bpy.types.Scene) -> str:
-    """What the names of layers begin with: as the artist has it, but for what parts names."""
+    """The prefix of layer names, as the artist set it, without characters that separate names."""
     return re.sub(r"[^\w-]", "_", scene.arto.layer_prefix)
 
 
 def channel_name(scene: bpy.types.Scene, layer: str) -> str:
-    """What a layer is called in files and in the mixer."""
+    """The name of a layer in files and in the mixer, prefix included."""
     return f"{prefix_of(scene)}{layer_name(layer)}"
 
 
 def layer_name(name: str) -> str:
-    """A name for channels: no dot, which parts layers, no blank, and never a number alone."""
+    """A name for channels: without blanks, without dots, which separate layers, no bare number."""
     out = safe_name(name).replace(".", "_").replace(" ", "_")
     return f"layer_{out}" if out.isdigit() else out

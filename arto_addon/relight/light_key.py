@@ -1,4 +1,7 @@
-"""What a plate hangs on besides the field: by it the window knows whether one is up to date."""
+"""The key of a light: what a plate depends on besides the field.
+
+The window compares keys to know whether a plate is up to date.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +14,12 @@ from ..settings.table import values
 from ..world.kept import shows
 from ..world.own import gains_of
 
-# In a plate's header.
+# Where a plate's header holds the key.
 HEADER = "arto.light key"
 
 
 def light_key(scene: bpy.types.Scene, world: bpy.types.World) -> str:
-    """Sixteen letters that are the same for the same light of a scene."""
+    """A key of sixteen letters, the same whenever a scene's light and its settings are the same."""
     key, strength, turn = shows(scene, world)
     settings = scene.arto
     of: list[object] = [key, round(strength, 5), round(turn, 5), scene.render.film_transparent]

@@ -1,4 +1,4 @@
-"""Looks: lights that a shot is shown in, each with a world of its own, by name."""
+"""Looks: named lights that a shot is shown in, each with its own world."""
 
 from __future__ import annotations
 
@@ -19,8 +19,11 @@ from .shown import Light, Ready, Shown
 
 
 def add(scene: bpy.types.Scene, name: str = "") -> Any:
-    """A look of the light as it is now; it is shown. The first one takes the world as it stands,
-    the others a copy, so that each has its own. Raises SceneError without a world."""
+    """Keep the light as it is now as a new look, and show the look.
+
+    The first look takes the scene's world. Later looks take a copy of the world, so that no two
+    looks share a world. Raises SceneError without a world.
+    """
     settings = scene.arto
     world = world_of(scene)
     if world is None:
@@ -31,12 +34,12 @@ def add(scene: bpy.types.Scene, name: str = "") -> Any:
     if world in taken:
         world = world.copy()
     look.world = world
-    settings.active_look = len(settings.looks) - 1  # which shows it
+    settings.active_look = len(settings.looks) - 1  # setting this shows the look
     return look
 
 
 def remove(scene: bpy.types.Scene) -> str:
-    """Remove the look that is shown -> its name; its world stays in the file while it is used."""
+    """Remove the look that is shown -> its name. The look's world is left in the file."""
     settings = scene.arto
     name = settings.looks[settings.active_look].name
     settings.looks.remove(settings.active_look)
@@ -48,7 +51,7 @@ def remove(scene: bpy.types.Scene) -> str:
 
 
 def show(scene: bpy.types.Scene) -> None:
-    """Show the scene in the look that is chosen: its world, and its plate's name."""
+    """Give the scene the world and the plate's name of the chosen look."""
     settings = scene.arto
     if not 0 <= settings.active_look < len(settings.looks):
         return
@@ -64,14 +67,14 @@ def show(scene: bpy.types.Scene) -> None:
 
 
 def named(scene: bpy.types.Scene, look: Any) -> None:
-    """A look was given a name: no other has it, and the one that is shown is called so."""
+    """Follow a look's new name: make the name unique, and name the plate if the look is shown."""
     settings = scene.arto
     others = {k.name for k in settings.looks if k != look}
     name = look.name.strip() or "Look"
     if name in others:
         name = free_name(scene, name)
     if name != look.name:
-        look.name = name  # which comes here again
+        look.name = name  # setting the name calls this function again
         return
     shown = settings.active_look
     if 0 <= shown < len(settings.looks) and settings.looks[shown] == look:
@@ -79,7 +82,7 @@ def named(scene: bpy.types.Scene, look: Any) -> None:
 
 
 def free_name(scene: bpy.types.Scene, name: str) -> str:
-    """That name, or with a number after it where a look has it."""
+    """The name, with a number after it where another look has the same name."""
     taken, number, found = {look.name for look in scene.arto.looks}, 2, name
     while found in taken:
         found, number = f"{name} {number}", number + 1
@@ -116,7 +119,7 @@ def relight_looks(scene: bpy.types.Scene, view_layer: str) -> Steps:
 
 
 def show_looks(scene: bpy.types.Scene, view_layer: str) -> Steps:
-    """`relight_looks`, here: each plate comes into the scene's compositor."""
+    """Relight the looks as `relight_looks` does, and put each plate into the scene's compositor."""
     done = yield from relight_looks(scene, view_layer)
     for look, path in zip((k for k in scene.arto.looks if k.world), done, strict=True):
         present(scene, path, look.name)

@@ -1,4 +1,7 @@
-"""Many lights at once: files of worlds, a turntable, frames. What hangs on no light is shared."""
+"""Many lights at once: files of worlds, a turntable, frames.
+
+Work that is the same for all lights, such as reading the field, is done once.
+"""
 
 from __future__ import annotations
 
@@ -34,10 +37,12 @@ def relight_many(
 ) -> Steps:
     """Show a shot in many lights; returns the paths of the pictures.
 
-    worlds: environment maps to take in the place of the scene's world; turns: so many pictures of
-    each, turned about the vertical from one to the next, once around; frames: of an animated world,
-    or of the shot where its frames were captured. Pictures are named after map, and numbered by
-    turn or frame. Raises what `relight.compute` raises; the scene is put back to its frame.
+    worlds: environment maps that replace the scene's world, one after another; turns: the number of
+    pictures for each world, which turns once around the vertical in equal steps; frames: the frames
+    to show, of a captured sequence or of an animated world over a still.
+
+    The pictures are named after their map and numbered by turn or frame. The scene is put back to
+    its frame. Raises what `relight.compute` raises.
     """
     if turns > 1 and frames:
         raise SceneError("a turntable is of one frame: leave one of the two out")
@@ -54,13 +59,13 @@ def relight_many(
                 scene.view_layers[view_layer].update()
                 still = _shown(scene, view_layer, still)
             assert still is not None
-            # at this frame: the output may have its number in it
+            # worked out at each frame: the path may contain the frame's number
             base = paths.relit_file(scene)
             numbered = frames and paths.numbers_frames(scene)
             every = [(file, turn) for file in worlds or [None] for turn in range(turns)]
             most = max(1, together(still.field) // len(still.takes))
             for first in range(0, len(every), most):
-                # the field is read once for so many lights
+                # read the field once for all lights that fit into memory together
                 with ExitStack() as lent:
                     ready: list[Ready] = []
                     for file, turn in every[first : first + most]:
@@ -85,12 +90,12 @@ def relight_many(
 
 
 def _check_worlds(worlds: Sequence[Path]) -> None:
-    """Raise SceneError where a file of a world is missing, or two pictures had one name."""
+    """Raise SceneError where a world's file is missing, or two pictures would have one name."""
     names: dict[str, Path] = {}
     for file in worlds:
         if not file.is_file():
             raise SceneError(f"there is no environment map {file}")
-        # no difference to Windows and macOS
+        # Windows and macOS do not tell upper from lower case in names
         name = safe_name(file.stem).casefold()
         if name in names:
             raise SceneError(
@@ -101,8 +106,10 @@ def _check_worlds(worlds: Sequence[Path]) -> None:
 
 
 def _check_frames(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> None:
-    """Raise CaptureSetError where some frames of a shot were captured and others of the sequence
-    were not: an animated world over a still is of one captured frame."""
+    """Raise CaptureSetError where only some of the frames were captured.
+
+    With one captured frame the shot is a still, and its world may be animated.
+    """
     begun = paths.frames(scene, view_layer)
     there = sorted(frame for frame, whole in begun.items() if whole)
     missing = [frame for frame in frames if frame not in there]
@@ -117,7 +124,7 @@ def _check_frames(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]
 
 
 def _quietly(steps: Steps, share: float) -> Steps:
-    """The steps but for what they say: said once for all, it would be lost among them."""
+    """Run the steps of one picture without their messages, which would be lost among many."""
 
     def change(step: Progress | Render) -> Render | None:
         if isinstance(step, Progress):
@@ -131,9 +138,9 @@ def _quietly(steps: Steps, share: float) -> Steps:
 def _lent(
     lent: ExitStack, scene: bpy.types.Scene, view_layer: str, file: Path | None, turn: float
 ) -> bpy.types.World | None:
-    """The world of a picture, for as long as it is lent; None for the scene's own.
+    """The world of a picture, which `lent` removes again; None for the scene's own world.
 
-    turn: of the whole circle.
+    turn: as a share of the whole circle.
     """
     world = lent.enter_context(_world_showing(file)) if file else None
     if turn:
@@ -142,27 +149,30 @@ def _lent(
 
 
 def relight_frames(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> Steps:
-    """Relight the frames of a shot, or of an animated world over a still, and show them as a
-    sequence in the compositor; returns their paths. Raises as `relight_many`."""
+    """Relight frames and show them as a sequence in the compositor; returns the pictures' paths.
+
+    The frames are those of a captured sequence, or of an animated world over a still. Raises what
+    `relight_many` raises.
+    """
     done = yield from relight_many(scene, view_layer, frames=frames)
     present_frames(scene, done[0], frames)
     return done
 
 
 def frames_of(scene: bpy.types.Scene) -> range:
-    """The frames that the scene renders."""
+    """The frames that an animation render of the scene has."""
     return range(scene.frame_start, scene.frame_end + 1, scene.frame_step)
 
 
 def _named(base: Path, file: Path | None, number: int | None) -> Path:
-    """The name of one of many pictures: `shot_sunset_0001.exr`."""
+    """The path of one of many pictures, as in `shot_sunset_0001.exr`."""
     parts = [base.stem, *([safe_name(file.stem)] if file else [])]
     parts += [f"{number:04d}"] if number is not None else []
     return base.with_name("_".join(parts) + ".exr")
 
 
 def _shown(scene: bpy.types.Scene, view_layer: str, still: Shown | None) -> Shown:
-    """The field of the scene's frame; where none was captured, that of the still before it."""
+    """Open the field of the scene's frame; of the still, where this frame was not captured."""
     folder = paths.field_folder(scene, view_layer)
     if folder.exists():
         found = Shown(scene, view_layer, folder)
@@ -171,7 +181,7 @@ def _shown(scene: bpy.types.Scene, view_layer: str, still: Shown | None) -> Show
     now = shot_of(scene, view_layer)
     near = paths.nearest(scene, view_layer)
     if still is None and near is None:
-        return Shown(scene, view_layer)  # which says what to do
+        return Shown(scene, view_layer)  # raises an error that says what to do
     if still is None:
         assert near is not None
         with frame_kept(scene):

@@ -29,20 +29,22 @@ from ..world.own import own_of
 from . import files, light_key
 from .shown import Laps, Light, Ready, Shown
 
-# From this share of the light on the lamps are the picture, and what the field adds is denoised
-# with them: by themselves, beside darkness, they come out of the denoiser worse (docs/accuracy.md).
+# From this share of the light on, the lamps' picture and the field's are denoised as a single sum.
+# The lamps alone, with darkness beside their light, come out of the denoiser worse
+# (docs/accuracy.md).
 NEARLY_ALL = 0.9
-# Alpha from which on nothing is seen behind: the rounding of a mean of many ones.
+# From this alpha on nothing is seen behind: a mean of many samples of alpha 1 is rounded to less.
 OPAQUE = 1 - 1e-5
-# A lamp of more than this share of the light is looked for behind the plate by every pixel.
+# If the lamps have more than this share of the light, every pixel behind the plate looks for them.
+# If light below 0 has more than this share, the artist is told.
 LEAST_SHARE = 1e-3
 
 
 def relight(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     """Relight the scene's field with its world and show it: `compute`, then `present.present`.
 
-    Raises what `compute` raises; nothing of the scene changes but the plate's image and its node in
-    the compositor.
+    In the scene only the plate's image and the plate's node in the compositor change. Raises what
+    `compute` raises.
     """
     path, seconds = yield from compute(scene, view_layer)
     present(scene, path)
@@ -52,8 +54,9 @@ def relight(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
 def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     """Relight the scene's field with its world; returns (path of the EXR, seconds by part).
 
-    Raises SceneError, CaptureSetError (of another shot), ShotError (another's), FieldError,
-    EnvironmentMapError, ExrError, CancelledError; nothing of the scene changes.
+    The scene does not change. Raises SceneError, CaptureSetError (captured for another camera,
+    frame or size), ShotError (captured for another file or scene), FieldError, EnvironmentMapError,
+    ExrError, CancelledError.
     """
     layer = view_layer or layer_of(scene)
     check_world(scene, layer)
@@ -66,23 +69,29 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
 
 
 def show(shown: Shown, lit: Light) -> Steps:
-    """Write the picture of a field in a light; returns seconds by part. Raises as `compute`."""
+    """Make and write the plate of a field in a light; returns seconds by part of the work.
+
+    Raises what `compute` raises.
+    """
     ready = yield from make_ready(shown, lit)
     yield Progress(0.6, "relighting")
     return (yield from finish(shown, ready, shown.pictures([ready.light])[0]))
 
 
 def make_ready(shown: Shown, lit: Light) -> Steps:
-    """Bring a light to the patches -> `Ready`. Raises as `compute`."""
+    """Prepare a light: bake its map, render its lamps, bring it to the patches -> `Ready`.
+
+    Raises what `compute` raises.
+    """
     scene, layer, field = shown.scene, shown.layer, shown.field
     settings = scene.arto
     world = lit.world or check_world(scene, layer)
     laps = Laps()
     changed = shown.changed()
     if changed:
-        # allowed: it is the artist who knows whether it shows
+        # a warning, not an error: only the artist knows whether the change shows
         yield Progress(0.0, f"the scene is not the captured one: {'; '.join(changed[:3])}")
-    # what cannot be read or written is said before the long work
+    # raise before the long work what would be raised after it
     plate.window_of(scene).check(field.shape)
     shown.filmed()
     yield Progress(0.0, "bringing the world to an environment map")
@@ -109,8 +118,11 @@ def make_ready(shown: Shown, lit: Light) -> Steps:
 
 
 def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> Steps:
-    """Make the plate of what the fields of a shot show in a light, (H, W, 4) each, and write it;
-    returns seconds by part. Raises as `compute`."""
+    """Make the plate and write it; returns seconds by part of the work.
+
+    pictures: for each take what its field shows in the light, (H, W, 4). Raises what `compute`
+    raises.
+    """
     scene, lit = shown.scene, ready.lit
     settings, path = scene.arto, lit.path
     lap = ready.laps.lap
@@ -119,7 +131,8 @@ def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> S
         summed.append((yield from _with_own(take, ready, picture, parts)))
     by, held = shown.takes, 0.0
     if len(by) > 1:
-        # of the first two what is divided by each other, and alike denoised: `of_ground`
+        # The first two takes are divided by each other. The visible ground of each is denoised in
+        # their place (`of_ground`), with the same guides.
         whole, ground, apart = summed
         apart = [np.maximum(part, 0) for part in apart]
         held = shown.held_out(*(picture[..., 3] for picture in pictures))
@@ -134,15 +147,15 @@ def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> S
             summed = [[t.denoised(*parts)] for t, parts in zip(by, summed, strict=True)]
             denoised = "Open Image Denoise"
         else:
-            # said here, in the file's header and in the last line
+            # three places say this: this message, the file's header and the last message
             denoised = "no: this Blender was built without Open Image Denoise"
             yield Progress(0.7, f"denoising: {denoised}")
         lap("denoise")
     for picture, parts in zip(pictures, summed, strict=True):
         picture[..., :3] = sum(parts)
     picture, caught = pictures[-1], None
-    # a plane laid through a sun beside darkness undershoots; a picture has no negative light, while
-    # what is left of two is off to both sides
+    # A plane fitted through a sun beside darkness falls below 0. A picture has no negative light.
+    # The pictures of the ground keep their negative values, since their noise is on both sides.
     np.maximum(picture, 0, out=picture)
     if len(pictures) > 1:
         left, bare, apart = pictures
@@ -168,7 +181,7 @@ def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> S
 def check_finite(picture: NDArray | float, name: str) -> None:
     """Raise FieldError where a picture, (H, W, C), has a value that is infinite or not a number.
 
-    name: what the picture is, for the message: it has to say where such a value comes from.
+    name: the picture's, for the message, which has to say where the value comes from.
     """
     good = np.isfinite(picture)
     if good.all():
@@ -184,8 +197,11 @@ def check_finite(picture: NDArray | float, name: str) -> None:
 def _with_own(
     shown: Shown, ready: Ready, picture: NDArray[np.float32], parts: list[NDArray[np.float32]]
 ) -> Steps:
-    """The pictures that a take's plate is the sum of: of what its field shows, (H, W, 4), with the
-    scene's own lamps, and of the lamps of the world."""
+    """Add the scene's own lamps to a take's picture -> the pictures that sum to the take's plate.
+
+    picture: what the take's field shows, (H, W, 4); parts: pictures of the world's lamps, none or
+    one. Raises FieldError where a value is not finite.
+    """
     check_finite(picture, f"what the reflectance field in {shown.field.folder} shows")
     for part in parts:
         check_finite(part, "the render of the world's lamps")
@@ -199,8 +215,10 @@ def _with_own(
 
 
 def _lamps(shown: Shown, found: Split) -> Steps:
-    """The light of the world's lamps, rendered by itself -> (pictures, none or one; what was done,
-    in words; whether they have nearly all the light)."""
+    """Render the light of the world's lamps by itself.
+
+    -> (pictures, none or one; what was done, in words; whether the lamps have nearly all the light)
+    """
     settings, about = shown.scene.arto, shown.field.about
     if not settings.lamps or not found.worth:
         return [], "no", False
@@ -223,11 +241,14 @@ def _lamps(shown: Shown, found: Split) -> Steps:
 def _hold(
     shown: Shown, whole: Environment, picture: NDArray[np.float32], parts: list[NDArray]
 ) -> Steps:
-    """Hold a picture to the brightness that a small render of its light has: of light that only
-    shadow rays bring, Cycles lets hang on the whole world how much of it there is."""
+    """Scale a picture to the mean brightness that a small render in the same light has.
+
+    Some light reaches the picture by shadow rays alone. How much of it Cycles gives depends on the
+    whole world, and is not the sum over its patches.
+    """
     region = shown.field.region.slices
     expected = yield from brightness(shown.scene, shown.field, whole, 0.65)
-    for rendered in parts:  # the lamps' light, which is Cycles' already
+    for rendered in parts:  # Cycles has rendered the lamps: their brightness is right already
         expected = np.maximum(expected - rendered[region].mean(axis=(0, 1)), 0)
     found = picture[region][..., :3].mean(axis=(0, 1), dtype=np.float64)
     picture[..., :3] *= np.divide(expected, found, out=np.ones(3), where=found > 0)
@@ -239,7 +260,7 @@ def _behind(shown: Shown, lit: Light, picture: NDArray[np.float32], has_lamps: b
     captured = shown.field.region
     if holds_out(scene, layer):
         if len(shown.takes) > 1:
-            # what is behind is seen through the shadows, and in the holes not at all
+            # the world behind shows through the shadows, but not in the holes
             solid = without_holes(scene, captured, layer, lit.world)
             there = background(scene, captured, layer, has_lamps, lit.world)
             seen = np.clip(solid - picture[..., 3], 0, 1)

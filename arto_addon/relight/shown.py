@@ -1,4 +1,4 @@
-"""What a relight works with: a light, a shot's field opened, and both made ready for each other."""
+"""What a relight works with: a light, the opened field of a shot, and a light made ready."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ from ..world.background import holds_out
 
 
 class Laps:
-    """Seconds by part."""
+    """A stopwatch: the seconds that each part of the work took."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
         self.go_on()
 
     def go_on(self) -> None:
-        """Count from now."""
+        """Let the next part begin now."""
         self._last = time.perf_counter()
 
     def lap(self, name: str) -> None:
@@ -49,8 +49,11 @@ class Laps:
 
 @dataclass(frozen=True)
 class Light:
-    """A light to show a shot in. world: None for the view layer's own; path: of the picture;
-    look: what it is called in the picture's header."""
+    """A light to show a shot in.
+
+    path: of the picture to write; look: the light's name in the picture's header; world: None for
+    the view layer's own world.
+    """
 
     path: Path
     look: str = ""
@@ -58,9 +61,10 @@ class Light:
 
 
 class Shown:
-    """A shot's field, opened: what all the lights that it is shown in have in common.
+    """The opened field of a shot, shared by all the lights that the shot is shown in.
 
-    Raises SceneError, CaptureSetError (of another shot), ShotError (another's), FieldError.
+    Raises SceneError, CaptureSetError (captured for another camera, frame or size), ShotError
+    (captured for another file or scene), FieldError.
     """
 
     def __init__(self, scene: bpy.types.Scene, view_layer: str, folder: Path | None = None) -> None:
@@ -81,8 +85,8 @@ class Shown:
 
     @property
     def takes(self) -> list[Shown]:
-        """Of a shot with shadow catchers: of everything, of the catchers, of the things."""
-        # made when it is asked for: kept, it would be a circle that keeps fields mapped
+        """The takes of the shot; with shadow catchers: everything, the catchers, the things."""
+        # a new list each time: a kept list holds itself, and its fields would stay mapped in memory
         return [self, *self._others]
 
     def _beside(self, folder: Path) -> Shown:
@@ -96,7 +100,7 @@ class Shown:
         return found
 
     def pictures(self, lights: Sequence[PatchLight]) -> list[list[NDArray[np.float32]]]:
-        """For each light what each take's field shows in it, (H, W, 4)."""
+        """What each take's field shows in each light: a list by light, then take, of (H, W, 4)."""
         # the first two are divided by each other
         takes = self.takes
         cut = [len(takes) > 1 and take is not takes[-1] for take in takes]
@@ -104,7 +108,7 @@ class Shown:
         return [list(each) for each in zip(*found, strict=True)]
 
     def changed(self) -> list[str]:
-        """What of the scene is not as it was captured, at its frame."""
+        """What has changed in the scene since the capture, at the scene's frame, in words."""
         frame = self.scene.frame_current, self.scene.frame_subframe
         if frame not in self._changed:
             then = self.field.about.fingerprint
@@ -113,8 +117,11 @@ class Shown:
         return self._changed[frame]
 
     def filmed(self) -> tuple[str, NDArray[np.float32]] | None:
-        """The name and the picture of the footage that the things of a shot with shadow catchers
-        are put into, at its frame; read once for all lights. Raises SceneError."""
+        """The name and the picture of the footage that the things are put over, at this frame.
+
+        Only a shot with shadow catchers has footage. It is read once for all lights. Raises
+        SceneError.
+        """
         found = footage(self.scene) if len(self.takes) > 1 else None
         if found is None:
             return None
@@ -124,8 +131,10 @@ class Shown:
         return self._filmed[1]
 
     def split(self, whole: Environment) -> Split:
-        """The lamps cut out of a light. Where patches are all around, a turned map is cut as it was
-        before."""
+        """Cut the lamps out of a light.
+
+        Where patches are all around, the cut does not depend on the light's turn and is reused.
+        """
         if not self.field.hemicube.closed:
             return split(whole, self.field.hemicube)
         if self._split is None or self._split[0] is not whole.image:
@@ -135,7 +144,10 @@ class Shown:
         return Split(rest, lamps, found.share)
 
     def held_out(self, *alphas: NDArray[np.float32]) -> NDArray[np.float32] | float:
-        """How much of each pixel is cut out before the ground, from its takes' alphas, (H, W)."""
+        """How much of each pixel holdouts cut out in front of the ground, (H, W).
+
+        alphas: of the pictures of all takes, (H, W) each.
+        """
         return held_out(*alphas) if holds_out(self.scene, self.layer) else 0.0
 
     @cached_property
@@ -143,10 +155,10 @@ class Shown:
         return guides.guides_of(self.field)
 
     def denoised(self, *parts: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The sum of pictures of what the field shows, (H, W, 3), each denoised by itself."""
+        """Denoise pictures of what the field shows, (H, W, 3), one by one -> their sum."""
         clean = guides.clean(self.field)
         found = denoise.denoise(self.guides, *parts, clean=clean, like=self.scene)
-        # a denoiser lets outlines glow into what is empty, and footage is seen through that
+        # a denoiser lets light at outlines spill into empty pixels, where it would brighten footage
         nothing = self.field.layer("alpha") == 0
         for part in parts:
             nothing &= ~part.any(axis=-1)
@@ -156,11 +168,11 @@ class Shown:
 
 @dataclass
 class Ready:
-    """A light, made ready to be shown in: its lamps are rendered, its bins are full.
+    """A light made ready: its lamps are rendered and it is brought to the patches.
 
-    whole: its environment; found: that without lamps, and these; rendered: for each take, pictures
-    of the lamps, none or one; lamps: what was done with them, in words; together: whether they have
-    nearly all light.
+    whole: the light's environment; found: the environment without the lamps, and the lamps;
+    rendered: for each take, pictures of the lamps, none or one; lamps: what was done with the
+    lamps, in words; together: whether the lamps have nearly all the light.
     """
 
     lit: Light
