@@ -1,1 +1,1 @@
-"""The light that is asked for: the scene's world as a map, as a background, as lamps (paper 6)."""
+"""The light to relight with: the scene's world as a map, as a background, as lamps (paper 6)."""

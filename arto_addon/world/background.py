@@ -1,4 +1,4 @@
-"""The world as the camera sees it behind everything."""
+"""The world as the camera sees it behind all things."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ from ..stage.takes import WHOLE, take
 from ..work import Render, blocking_render
 from .check import check_world
 
-# Of the world that is seen behind everything, and the noise at which a pixel has enough.
+# The most samples of a pixel of the background, and the noise at which a pixel has enough samples.
 BACKGROUND_SAMPLES = 64
 BACKGROUND_NOISE = 0.002
 
 
 def _set(on: Stage, world: bpy.types.World, region: Region, even: bool) -> None:
-    """The stage with the world on it, and samples for nothing but the world.
+    """Put the world on the stage, and set the samples for a render of the world alone.
 
-    even: as many for every pixel. Where a sun is smaller than a pixel, a pixel that looks even may
-    have missed it.
+    even: give every pixel all samples. A sun may be smaller than a pixel. With adaptive sampling,
+    a pixel that has missed the sun would then stop early.
     """
     prepare(on, layers=0)
-    # whatever the artist looks at meanwhile: the field is Cycles'
+    # The field was rendered by Cycles, whatever engine the artist works with now.
     on.scene.render.engine = "CYCLES"
     on.scene.render.film_transparent = False
     cycles, layer = on.scene.cycles, on.scene.view_layers[0]
     layer.use_pass_z = layer.cycles.denoising_store_passes = False
     on.scene.world = on.made(world.copy())
-    # nothing is lit here, so no map of where the light comes from is needed
+    # Nothing is lit here, so Cycles needs no map for importance sampling.
     on.scene.world.cycles.sampling_method = "NONE"
     cycles.samples = BACKGROUND_SAMPLES
     cycles.use_adaptive_sampling = not even
@@ -66,13 +66,15 @@ def background(
     even: bool = False,
     world: bpy.types.World | None = None,
 ) -> NDArray[np.float32]:
-    """The world as the artist's camera sees it behind everything -> (H, W, 3).
+    """Render the world as the artist's camera sees it behind all things -> (H, W, 3).
 
-    It is rendered from a copy of the scene with nothing in it: lens, motion blur, film and whatever
-    else the scene has are the scene's. region: all that is looked at, 0 outside (default:
-    everything). Pixels get as many samples as they need, up to `BACKGROUND_SAMPLES`: next to none
-    in an even sky, all on the rim of a sun; or all of them (`even`), for a world with lamps.
-    world: another than the view layer's.
+    The render is of a copy of the scene without objects, so lens, motion blur and film are the
+    scene's.
+    region: the part to render (default: all); the rest is 0.
+    even: give every pixel `BACKGROUND_SAMPLES`, for a world with lamps. Else a pixel gets as many
+    as it needs: few in an even sky, all on the rim of a sun.
+    world: the world to render (default: the view layer's).
+    Raises SceneError, CancelledError.
     """
     layer = view_layer or layer_of(scene)
     world = world or check_world(scene, layer)
@@ -92,14 +94,14 @@ def background(
 
 
 def holds_out(scene: bpy.types.Scene, view_layer: str) -> bool:
-    """Whether anything may cut a hole into the picture that the world is not seen through."""
+    """Whether a holdout may cut a hole into the picture, in which the world is not seen."""
     todo = [scene.view_layers[view_layer].layer_collection]
     while todo:
         collection = todo.pop()
         if collection.holdout:
             return True
         todo += collection.children
-    # in the file, if not in this scene: a render more than is needed does no harm
+    # This looks at the whole file, not at the scene alone: a needless render does no harm.
     return any(o.is_holdout for o in bpy.data.objects) or any(
         node.bl_idname == "ShaderNodeHoldout"
         for material in bpy.data.materials
@@ -114,10 +116,12 @@ def background_with_holes(
     view_layer: str,
     world: bpy.types.World | None = None,
 ) -> NDArray[np.float32]:
-    """What of the world is seen between the scene's things, and where it is opaque -> (H, W, 4).
+    """Render the part of the world that is seen between the scene's things -> (H, W, 4).
 
-    For a scene that holds out: premultiplied by what is not in front of the world, to be added to a
-    plate; alpha is 0 in the holes, and outside the region.
+    For a scene with holdouts. The colour is premultiplied by how much of the world is not covered,
+    so that it can be added to a plate. Alpha is the whole picture's: 0 in the holes and outside the
+    region.
+    world: the world to render (default: the view layer's).
     """
     world = world or check_world(scene, view_layer)
     width, height = picture_size(scene)
@@ -137,8 +141,10 @@ def without_holes(
     view_layer: str,
     world: bpy.types.World | None = None,
 ) -> NDArray[np.float32]:
-    """Where the picture of a scene with shadow catchers and its world is opaque -> (H, W); 0 in its
-    holes, and outside the region. The catchers are there as ordinary things."""
+    """Render the alpha of a scene with shadow catchers and its world -> (H, W).
+
+    The catchers are there as ordinary things. Alpha is 0 in holes and outside the region.
+    """
     world = world or check_world(scene, view_layer)
     width, height = picture_size(scene)
     out = np.zeros((height, width), np.float32)
@@ -151,8 +157,10 @@ def without_holes(
 
 
 def _set_behind(on: Stage, world: bpy.types.World, region: Region) -> str:
-    """The stage with the world for the camera alone, in a light group of its own, whose name this
-    is: what else is lit is no matter."""
+    """Show the world to the camera alone, in a light group of its own; returns the group's name.
+
+    Only the world's light group is read, so it does not matter what else lights the stage.
+    """
     _set(on, world, region, even=True)
     rays = on.scene.world.cycles_visibility
     for prop in rays.bl_rna.properties:

@@ -1,8 +1,8 @@
-"""The scene's world, whatever its nodes, brought to an environment map.
+"""Bake the scene's world, whatever its nodes, to an environment map.
 
-Cycles itself evaluates it, through a panoramic camera. A world may show the camera something else
-than it lights the scene with (Light Path nodes, ray visibility); then the camera sits inside a box
-that refracts with an index of 1: what comes through is the world as the scene's surfaces see it.
+Cycles evaluates the world through a panoramic camera. Light Path nodes and ray visibility may show
+the camera another world than lights the scene. Then the camera sits inside a box that refracts with
+an index of 1. Through the box, the camera sees the world as the scene's surfaces see it.
 """
 
 from __future__ import annotations
@@ -24,24 +24,27 @@ from .detail import detail
 from .studio import render as render_studio
 from .studio import studio_scene
 
-# The least samples of a texel; a world that is finer than the map gets as many as it is finer.
+# The least samples of a texel. A world that is finer than the map gets more, by the texels of the
+# world in a texel of the map.
 SAMPLES = 4
-# And of a map that is made in a moment.
+# The samples of a texel of a rough map.
 ROUGH_SAMPLES = 2
-# A texel that carries more than this share of all the light is a sun or a lamp: its edge is
-# rendered again, this many times as fine as the world (which leaves 0.3% of the light of a lamp of
-# two of the world's texels), or as its part of these samples allows.
+# A texel with more than the share HOT of all light is part of a sun or a lamp. Such texels are
+# rendered again with their neighbours, FINER times as fine as the world. A lamp as large as two of
+# the world's texels then keeps its light to 0.3%. All these renders together take about
+# HOT_SAMPLES, which may make them less fine.
 HOT = 1e-3
 FINER = 20
 HOT_SAMPLES = 2**23
-# Cycles' samples lie too near to a texel's middle, by 1 / n: no lamp is left with fewer.
+# The least samples of such a texel. Of n samples, Cycles puts each too near to the texel's middle,
+# by 1 / n.
 LEAST_HOT = 256
 BLOCK = 32
 LEAST_WIDTH = 1024
 
 
 def _pass_through(made: list[bpy.types.ID], studio: bpy.types.Scene) -> None:
-    """The box around the camera: what it lets through is no longer a camera ray."""
+    """Put a clear box around the camera, so that rays behind the box are no camera rays."""
     material = new_material("ARTO Pass Through")
     tree = material.node_tree
     tree.nodes.clear()
@@ -77,9 +80,12 @@ def sees_the_camera(world: bpy.types.World) -> bool:
 
 
 def _by_area(world: bpy.types.World) -> None:
-    """Have a world shine by the cosine of the latitude, which is what a direction of an
-    equirectangular map counts for: within a texel with a lamp in it, too, and beside a pole above
-    all. (An even texel needs none of it, and would get the noise of it.)"""
+    """Multiply a world's light by the cosine of the latitude.
+
+    The samples of a texel are spread evenly over the equirectangular map, where solid angle goes by
+    that cosine. The weight matters for a texel with a lamp inside, above all beside a pole. An even
+    texel does not need the weight, which would only add noise.
+    """
     tree = shader_tree(world)
     out = tree.get_output_node("CYCLES") if tree else None
     if tree is None or out is None or not out.inputs["Surface"].is_linked:
@@ -88,7 +94,7 @@ def _by_area(world: bpy.types.World) -> None:
     direction = tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"]
     split = nodes.add("ShaderNodeSeparateXYZ", direction)
     x, y = split.outputs[0], split.outputs[1]
-    # not from 1 - z^2, of which nothing is left beside a pole
+    # Not by 1 - z^2, which loses all its digits beside a pole.
     square = nodes.math("MULTIPLY_ADD", x, x, nodes.math("MULTIPLY", y, y))
     cosine = nodes.math("SQRT", square)
     mix = tree.nodes.new("ShaderNodeMixShader")
@@ -98,16 +104,19 @@ def _by_area(world: bpy.types.World) -> None:
 
 
 def _runs(these: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Begin and end of each run of True."""
+    """The begin and the end (exclusive) of each run of True."""
     edges = np.flatnonzero(np.diff(np.pad(these.astype(np.int8), 1)))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def _hot_blocks(image: NDArray[np.float32]) -> list[Region]:
-    """Rectangles around the texels that carry much of the light, and their neighbours, across the
-    map's seam as well."""
+    """Find rectangles that cover the texels with much of the light, and the texels' neighbours.
+
+    Neighbours across the map's seam count as well.
+    """
     environment = Environment(image)
-    # as bright as is hot on the equator: a lamp on a pole is in a whole row of texels
+    # Every row is held to the threshold of the equator. At a pole a lamp is spread over a whole row
+    # of small texels.
     solid_angle = environment.row_solid_angles.max()
     hot = image.max(axis=-1) * solid_angle > HOT * environment.irradiance().max()
     hot = np.pad(hot, ((1, 1), (0, 0)))
@@ -126,13 +135,13 @@ def _hot_blocks(image: NDArray[np.float32]) -> list[Region]:
 
 
 def _power_of_two(samples: float) -> int:
-    """The nearest number of samples of which Cycles' sequence is even."""
+    """The nearest power of two, for which Cycles' samples are spread evenly; at least `SAMPLES`."""
     return 2 ** round(math.log2(max(SAMPLES, samples)))
 
 
 @contextmanager
 def _panorama(scene: bpy.types.Scene, world: bpy.types.World) -> Iterator[bpy.types.Scene]:
-    """A studio with a camera that sees all of a world, as the scene's surfaces see it."""
+    """Make a studio whose camera sees all of a world, as the scene's surfaces see the world."""
     check_images(world)
     with studio_scene(scene, world, "ARTO World") as (studio, made):
         lens = bpy.data.cameras.new("ARTO Panorama")
@@ -142,21 +151,24 @@ def _panorama(scene: bpy.types.Scene, world: bpy.types.World) -> Iterator[bpy.ty
         studio.camera = camera
         lens.type = "PANO"
         lens.panorama_type = "EQUIRECTANGULAR"
-        # the middle of the picture looks along +X, as the middle of a world texture does
+        # The middle of the picture looks along +X, like the middle of a world texture.
         camera.rotation_euler = (math.pi / 2, 0, -math.pi / 2)
         lens.clip_start = 1e-3
         if sees_the_camera(world):
             _pass_through(made, studio)
             rays = studio.world.cycles_visibility
-            # what is hidden from some rays lights by others; these are those of the box
+            # Rays through the box are transmission rays. They must see the world wherever any other
+            # kind of ray sees it.
             rays.transmission = rays.diffuse or rays.glossy or rays.transmission or rays.scatter
         studio.cycles.pixel_filter_type = "BOX"
         yield studio
 
 
 def rough(scene: bpy.types.Scene, width: int, world: bpy.types.World) -> Environment:
-    """A map of a world that is made in a moment, for while a hand is on it: each texel of a few
-    samples, so that what is finer is noisy."""
+    """Make a rough map of a world in a moment, for Live while the artist moves a slider.
+
+    A texel has few samples, so detail finer than a texel is noisy.
+    """
     with _panorama(scene, world) as studio:
         studio.render.resolution_x, studio.render.resolution_y = width, width // 2
         studio.cycles.samples = ROUGH_SAMPLES
@@ -169,22 +181,22 @@ def bake(
     view_layer: str | None = None,
     world: bpy.types.World | None = None,
 ) -> Environment:
-    """The light of a view layer's world as an equirectangular map, width x width/2, in the working
-    space. world: another than the layer's.
+    """Bake a view layer's world to an equirectangular map, width x width / 2, in the working space.
 
-    Every texel is the mean over itself, of as many samples as the world's own detail asks for: a
-    disc of a tenth of a degree keeps its light to 1%. Raises SceneError for a world that is not
-    there or lacks an image.
+    Each texel is the mean of the light over the texel. The number of samples follows from the
+    detail of the world: a disc of a tenth of a degree keeps its light to 1%.
+    world: the world to bake (default: the view layer's). Raises SceneError where there is no world
+    or an image of the world is missing; CancelledError.
     """
     world = world or check_world(scene, view_layer)
     with _panorama(scene, world) as studio:
         finest = detail(world)
-        # a lamp is looked for in small texels, and a coarse map gets their means
+        # Lamps are found in small texels. A coarse map gets the means of the small texels.
         scale = math.ceil(min(finest, LEAST_WIDTH) / width)
         width, height = scale * width, scale * (width // 2)
         render = studio.render
         render.resolution_x, render.resolution_y = width, height
-        # the world's images are read once for all blocks
+        # Persistent data keeps the world's images loaded for all blocks.
         render.use_persistent_data = True
         fineness = finest / width
         studio.cycles.samples = _power_of_two(fineness**2)
@@ -193,7 +205,8 @@ def bake(
         _by_area(studio.world)
         edges = np.sin(np.linspace(np.pi / 2, -np.pi / 2, height + 1))
         cosine = ((edges[:-1] - edges[1:]) / (np.pi / height)).astype(np.float32)[:, None, None]
-        # half of the samples to all alike (a rim has found little light as yet), half by light
+        # One half of the samples is shared equally, and the other half by the blocks' light. By
+        # light alone, a block with only the rim of a lamp would get too few.
         energy = image.max(axis=-1) * Environment(image).row_solid_angles[:, None]
         light = [float(energy[b.slices].sum()) for b in blocks]
         for block, amount in zip(blocks, light, strict=True):
@@ -204,6 +217,6 @@ def bake(
             set_region(studio, block)
             rows, _ = block.slices
             image[block.slices] = render_studio(studio)[..., :3] / cosine[rows]
-        # which lets go of them
+        # This lets go of the images.
         render.use_persistent_data = False
     return Environment(image).coarser(scale)

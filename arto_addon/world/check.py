@@ -1,4 +1,4 @@
-"""What a world must have before it can light anything."""
+"""Check that a world can light a picture, and say what a map of the world cannot show."""
 
 from __future__ import annotations
 
@@ -12,15 +12,20 @@ from ..shot.shot import layer_of
 
 
 def world_of(scene: bpy.types.Scene, view_layer: str | None = None) -> bpy.types.World | None:
-    """The world that a view layer is rendered with (default: the one that is captured): its
-    override, or the scene's."""
+    """The world that a view layer is rendered with: the layer's override, or the scene's world.
+
+    view_layer: default: `layer_of`. None where the scene has no world.
+    """
     layer = scene.view_layers.get(view_layer or layer_of(scene))
     return (layer.world_override if layer else None) or scene.world
 
 
 def check_world(scene: bpy.types.Scene, view_layer: str | None = None) -> bpy.types.World:
-    """The world of a view layer. Raises SceneError where there is none, the layer leaves it out, it
-    has a volume, or an image of it is missing."""
+    """The world of a view layer, checked.
+
+    Raises SceneError where there is no world, where the layer leaves the world out, where the world
+    has a volume, or where an image of the world is missing.
+    """
     world = world_of(scene, view_layer)
     if world is None:
         raise SceneError(
@@ -52,8 +57,10 @@ def check_world(scene: bpy.types.Scene, view_layer: str | None = None) -> bpy.ty
 
 
 def check_images(world: bpy.types.World) -> None:
-    """Raise SceneError where an image of the world's is there and cannot be read: Cycles shows
-    magenta in its place. It loads them, as a render will."""
+    """Raise SceneError where a file of the world's images cannot be read.
+
+    Cycles would show magenta in place of the image. The check loads the images, as a render would.
+    """
     for tree in trees(shader_tree(world), set()):
         for node in tree.nodes:
             image = getattr(node, "image", None)
@@ -67,7 +74,7 @@ def check_images(world: bpy.types.World) -> None:
 
 
 def _fills(socket: bpy.types.NodeSocket) -> bool:
-    """Whether what is linked to a volume socket is anything: not muted, not of density 0."""
+    """Whether a volume socket gets a volume that is not muted and whose density is not 0."""
     link = next((i for i in socket.links if not i.is_muted), None)
     if link is None:
         return False
@@ -83,7 +90,7 @@ def _fills(socket: bpy.types.NodeSocket) -> bool:
 
 
 def check_no_volume(world: bpy.types.World) -> None:
-    """Raise SceneError for a world filled with fog: it swallows light from afar, an HDRI's too."""
+    """Raise SceneError for a world with a volume, which swallows all light from afar."""
     tree = shader_tree(world)
     out = tree.get_output_node("CYCLES") if tree else None
     if out and _fills(out.inputs["Volume"]):
@@ -93,15 +100,15 @@ def check_no_volume(world: bpy.types.World) -> None:
         )
 
 
-# Kinds of rays that a world may shine differently for, and none of which a map can tell apart.
+# Kinds of rays to which a world may show different light. A map has the same light for all.
 _KINDS = ("diffuse", "glossy", "transmission", "scatter")
 _OF_CAMERA = {"Is Camera Ray", "Is Shadow Ray"}
 
 
 def differs_by_rays(world: bpy.types.World) -> str:
-    """What a world does that one map of its light cannot, and what is used instead; "" if nothing.
+    """Say how a world's light differs by kind of ray, and what the map uses instead; "" if not.
 
-    A world that shows the camera alone something else is no such world.
+    A world that only shows the camera something else is fine: the background is rendered apart.
     """
     rays = world.cycles_visibility
     seen = [kind for kind in _KINDS if getattr(rays, kind)]

@@ -1,7 +1,8 @@
-"""Rotation, strength and tint of a world, whatever its nodes: its own where they are found, else
-nodes that are put in, where an artist sees them and undo takes them out.
+"""The sliders of a world: its rotation, strength and tint, whatever its nodes.
 
-Getters run while a panel is drawn and change nothing; setters are called when a slider is moved.
+A slider moves a node of the artist's where a fitting node is found. Else a setter adds nodes, which
+the artist can see and undo. Getters run while a panel is drawn, and change nothing. Setters run
+when a slider is moved.
 """
 
 from __future__ import annotations
@@ -13,18 +14,21 @@ import bpy
 from ..blender.nodes import shader_tree, world_of_nodes
 from .dials import backgrounds, put_in_scaler, put_in_turner, scaler, turner, why_not_turned
 
-# The node that is put in.
+# The name of the node that `set_tint` adds.
 TINT = "ARTO Tint"
 
 
 def turn(world: bpy.types.World) -> float:
-    """Radians about the vertical."""
+    """The rotation of a world about the vertical, in radians."""
     node = turner(world)
     return node.inputs["Rotation"].default_value[2] if node else 0.0
 
 
 def set_turn(world: bpy.types.World, angle: float) -> None:
-    """Turn a world; a mapping node is put in where there is none."""
+    """Turn a world to an angle in radians; a mapping node is added where there is none.
+
+    Nothing happens to a world that cannot be turned (`why_not_turned`).
+    """
     if why_not_turned(world):
         return
     node = turner(world) or put_in_turner(world)
@@ -37,8 +41,12 @@ def strength(world: bpy.types.World) -> float:
 
 
 def set_strength(world: bpy.types.World, value: float) -> None:
-    """Set how bright a world is; of one with many backgrounds, or a strength that is worked out, a
-    factor on all of them."""
+    """Set how bright a world is.
+
+    The value is the strength of the world's background node. Where there are several backgrounds,
+    or where other nodes work out the strength, it is a factor on all backgrounds. Nothing happens
+    to a world that is linked from a library or has no background.
+    """
     if not world.library:
         world_of_nodes(world)
     if world.library or not backgrounds(world):
@@ -56,7 +64,10 @@ def tint(world: bpy.types.World) -> tuple[float, float, float]:
 
 
 def set_tint(world: bpy.types.World, colour: Sequence[float]) -> None:
-    """Set the colour that a world's light is multiplied by."""
+    """Set the colour that multiplies a world's light.
+
+    Nothing happens to a world that is linked from a library or has no background.
+    """
     if not world.library:
         world_of_nodes(world)
     if world.library or not backgrounds(world):
@@ -90,7 +101,7 @@ def _add_tint(world: bpy.types.World) -> bpy.types.Node:
 
 
 def hdri(world: bpy.types.World) -> bpy.types.Image | None:
-    """The HDRI of a world's own tree, if it has one."""
+    """The HDRI in a world's own tree (not in its groups); None without one."""
     return next((n.image for n in texture_nodes(world) if n.image), None)
 
 
@@ -102,8 +113,11 @@ def texture_nodes(world: bpy.types.World) -> list[bpy.types.Node]:
 
 
 def set_hdri(world: bpy.types.World, image: bpy.types.Image) -> None:
-    """Light a world with an HDRI: in the node that shows one, else in a new one, linked to its
-    background."""
+    """Light a world with an HDRI.
+
+    The first environment texture shows the HDRI. Without such a node, a new one is linked to the
+    background.
+    """
     nodes = texture_nodes(world)
     if nodes:
         nodes[0].image = image

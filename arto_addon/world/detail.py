@@ -1,4 +1,4 @@
-"""How fine a world is: what its nodes can draw, read from the nodes."""
+"""How fine the detail of a world is, read from its nodes."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import bpy
 
 from ..blender.nodes import shader_tree, trees
 
-# The width of a map in which a lamp of a tenth of a degree is two texels wide. What nodes draw may
-# be as fine as that, and what is finer is not looked for.
+# The width of a map in which a lamp of a tenth of a degree is about two texels wide. Nodes that may
+# draw anything count as this fine, and no world counts as finer.
 FINEST = 8192
 
-# What hands on what it is given, or turns it.
+# Nodes that hand on light or a direction, or turn a direction.
 _STRUCTURE = {
     "NodeFrame",
     "NodeGroupInput",
@@ -28,8 +28,8 @@ _STRUCTURE = {
     "ShaderNodeTexCoord",
     "ShaderNodeVectorRotate",
 }
-# What computes a value from values, or is one: as even as what it is given, where that is no
-# direction.
+# Nodes that are a value or compute a value from values. Their output has no detail of its own, as
+# long as no direction comes in.
 _VALUES = {
     "NodeReroute",
     "ShaderNodeBlackbody",
@@ -60,7 +60,7 @@ _TURNED = {"NodeReroute", "ShaderNodeMapping", "ShaderNodeTexCoord", "ShaderNode
 
 
 def _above(node: bpy.types.Node, ends: set[str]) -> set[bpy.types.Node]:
-    """The nodes that a node's inputs come from, without what lies above nodes of kinds `ends`."""
+    """The nodes that lead to a node's inputs; the search stops at nodes of the kinds `ends`."""
     found: set[bpy.types.Node] = set()
     todo = [node]
     while todo:
@@ -74,7 +74,7 @@ def _above(node: bpy.types.Node, ends: set[str]) -> set[bpy.types.Node]:
 
 
 def values_only(node: bpy.types.Node, ends: set[bpy.types.Node]) -> bool:
-    """Whether what a node is given, down to the nodes `ends`, knows of no direction."""
+    """Whether no node that leads to a node depends on a direction; the search stops at `ends`."""
     found: set[bpy.types.Node] = set()
     todo = [node]
     while todo:
@@ -87,7 +87,7 @@ def values_only(node: bpy.types.Node, ends: set[bpy.types.Node]) -> bool:
 
 
 def _of_texture(node: bpy.types.Node) -> int:
-    """The width of a map as fine as an environment texture, as its nodes turn it."""
+    """The width of a map that is as fine as an environment texture behind its mapping nodes."""
     above = _above(node, set())
     if node.projection != "EQUIRECTANGULAR" or any(n.bl_idname not in _TURNED for n in above):
         return FINEST
@@ -104,10 +104,10 @@ def _of_texture(node: bpy.types.Node) -> int:
 
 
 def detail(world: bpy.types.World) -> int:
-    """The width of a map that holds whatever the world shows, 1 to `FINEST`.
+    """The width of a map that holds all detail of a world, 1 to `FINEST`.
 
-    Textures are as fine as their pixels, a sky as its sun; other nodes that know of a direction may
-    draw anything with it.
+    A texture is as fine as its pixels, and a sky as fine as its sun. Any other node that depends on
+    a direction may draw anything, so it counts as `FINEST`.
     """
     widest = 1
     textures = {"ShaderNodeTexEnvironment", "ShaderNodeTexSky"}
@@ -119,7 +119,7 @@ def detail(world: bpy.types.World) -> int:
             if kind == "ShaderNodeTexEnvironment":
                 widest = max(widest, _of_texture(node))
             elif kind == "ShaderNodeTexSky":
-                # two texels across its sun
+                # Two texels across the sun.
                 sun = math.degrees(node.sun_size) if node.sun_disc else 1.0
                 widest = max(widest, math.ceil(2 * 360 / max(sun, 1e-3)))
             elif kind in _STRUCTURE:

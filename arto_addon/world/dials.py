@@ -1,8 +1,10 @@
-"""The dials of a world: which node turns all of it, and which socket scales its strength.
+"""The dials of a world: the node that turns the world, and the socket that scales its strength.
 
-Sliders, turntables, and the maps of worlds that are kept all ask here. Where one background node
-and one mapping node stand for all of a world, a map need be made only once for every strength and
-turn. Where others do, a slider moves them, and where there are none, they are put in.
+Sliders, turntables and the kept maps of worlds all ask here. Two questions have different answers:
+- `whole`: which background node and which mapping node change nothing but the strength and the turn
+  of all light? A kept map is then used again for every strength and turn.
+- `scaler`, `turner`: what does a slider move? Where there is nothing to move, `put_in_scaler` and
+  `put_in_turner` add nodes.
 """
 
 from __future__ import annotations
@@ -17,11 +19,11 @@ from ...core.errors import SceneError
 from ..blender.nodes import shader_tree, trees
 from .detail import values_only
 
-# The nodes that are put in.
+# The names of the nodes that are added.
 TURN, STRENGTH, PLACE = "ARTO Turn", "ARTO Strength", "ARTO Place"
-# What has its picture by direction.
+# Nodes that show a picture by direction.
 _PICTURES = {"ShaderNodeTexEnvironment", "ShaderNodeTexSky"}
-# What a mapping node can be put behind.
+# Nodes after which a mapping node can be added.
 _SOURCES = {"ShaderNodeTexCoord", "ShaderNodeMapping", "ShaderNodeNewGeometry"}
 
 
@@ -32,14 +34,14 @@ def backgrounds(world: bpy.types.World) -> list[bpy.types.Node]:
 
 
 def _pictures(world: bpy.types.World) -> list[bpy.types.Node]:
-    """The nodes of a world's own tree that show a picture by its socket Vector."""
+    """The nodes of a world's own tree that show a picture by direction and have a socket Vector."""
     tree = shader_tree(world)
     found = [n for n in tree.nodes if n.bl_idname in _PICTURES] if tree else []
     return [n for n in found if "Vector" in n.inputs and not n.inputs["Vector"].is_unavailable]
 
 
 def _groups(world: bpy.types.World) -> list[bpy.types.Node]:
-    """The group nodes of a world's own tree in which a picture is."""
+    """The group nodes of a world's own tree whose groups contain a picture."""
     tree = shader_tree(world)
     return [
         node
@@ -50,7 +52,7 @@ def _groups(world: bpy.types.World) -> list[bpy.types.Node]:
 
 
 def _mappings_before(sockets: Iterable[bpy.types.NodeSocket]) -> list[bpy.types.Node]:
-    """The first mapping nodes on the ways that lead to sockets, each once."""
+    """The nearest mapping nodes on all ways that lead to some sockets, each once."""
     found: list[bpy.types.Node] = []
     seen: list[bpy.types.Node] = []
     todo = list(sockets)
@@ -68,8 +70,11 @@ def _mappings_before(sockets: Iterable[bpy.types.NodeSocket]) -> list[bpy.types.
 
 
 def turner(world: bpy.types.World) -> bpy.types.Node | None:
-    """The mapping node that turns all pictures of a world; None where there is none, or where
-    several do, or where its rotation is worked out by other nodes."""
+    """The mapping node that turns all pictures of a world.
+
+    None where there is no such node, where several nodes turn the pictures, or where other nodes
+    work out the rotation.
+    """
     ways = [[picture.inputs["Vector"]] for picture in _pictures(world)]
     ways = ways or [list(group.inputs) for group in _groups(world)]
     found = [_mappings_before(sockets) for sockets in ways]
@@ -80,7 +85,7 @@ def turner(world: bpy.types.World) -> bpy.types.Node | None:
 
 
 def why_not_turned(world: bpy.types.World) -> str:
-    """Why a world cannot be turned, for a grey slider; empty where it can."""
+    """Say why a world cannot be turned, for a grey slider; empty where it can be turned."""
     if world.library:
         return "The world is linked from a library: make it local to change it"
     if turner(world) is not None:
@@ -99,8 +104,11 @@ def why_not_turned(world: bpy.types.World) -> str:
 
 
 def _source(picture: bpy.types.Node) -> tuple[str, str, str]:
-    """What a picture's direction comes from: kind of node, its name where it is a mapping node (of
-    the others, one is as good as another), and the socket."""
+    """Where a picture's direction comes from: the kind of node, its name, and the socket's name.
+
+    The name is given for a mapping node alone. Of the other kinds, all nodes give the same
+    direction.
+    """
     links = picture.inputs["Vector"].links
     if not links:
         return "ShaderNodeTexCoord", "", "Generated"
@@ -110,7 +118,7 @@ def _source(picture: bpy.types.Node) -> tuple[str, str, str]:
 
 
 def put_in_turner(world: bpy.types.World) -> bpy.types.Node:
-    """A new mapping node that turns all pictures of a world, which `why_not_turned` lets be."""
+    """Add a mapping node that turns all pictures of a world. `why_not_turned` must be empty."""
     tree, pictures = world.node_tree, _pictures(world)
     node = tree.nodes.new("ShaderNodeMapping")
     node.name = node.label = TURN
@@ -132,7 +140,7 @@ def put_in_turner(world: bpy.types.World) -> bpy.types.Node:
 
 
 def scaler(world: bpy.types.World) -> bpy.types.NodeSocket | None:
-    """The socket that says how bright all of a world is; None where there is no such one."""
+    """The socket that scales the strength of a whole world; None where there is no such socket."""
     tree = shader_tree(world)
     if tree is None:
         return None
@@ -146,7 +154,7 @@ def scaler(world: bpy.types.World) -> bpy.types.NodeSocket | None:
 
 
 def put_in_scaler(world: bpy.types.World) -> bpy.types.NodeSocket:
-    """A new socket that all backgrounds of a world are multiplied by, with 1 in it."""
+    """Add a socket that multiplies the strength of all backgrounds of a world; its value is 1."""
     tree = world.node_tree
     dial = tree.nodes.new("ShaderNodeValue")
     dial.name = dial.label = STRENGTH
@@ -168,9 +176,11 @@ def put_in_scaler(world: bpy.types.World) -> bpy.types.NodeSocket:
 
 
 def whole(world: bpy.types.World) -> tuple[bpy.types.Node | None, bpy.types.Node | None]:
-    """The background node whose strength is that of all the world's light, and the mapping node of
-    which every picture of it hangs, so that a turn of the node is a turn of the light; None where
-    there is no such one."""
+    """Find the nodes whose strength and turn are the strength and turn of all the world's light.
+
+    Returns the background node whose strength scales all light, and the mapping node whose rotation
+    about the vertical turns all light; None for each that does not exist.
+    """
     tree = shader_tree(world)
     out = tree.get_output_node("CYCLES") if tree else None
     links = out.inputs["Surface"].links if out else ()
@@ -195,7 +205,7 @@ def whole(world: bpy.types.World) -> tuple[bpy.types.Node | None, bpy.types.Node
         and source[0].from_socket.name == "Generated"
         and len(mapping.outputs[0].links) == 1
     )
-    # nothing else may know of a direction
+    # No other node may depend on a direction.
     if not straight or not values_only(background, {texture}):
         return dial, None
     if mapping.vector_type != "POINT" or any(
@@ -204,13 +214,16 @@ def whole(world: bpy.types.World) -> tuple[bpy.types.Node | None, bpy.types.Node
         return dial, None
     scale, place = mapping.inputs["Scale"].default_value, mapping.inputs["Location"].default_value
     rotation = mapping.inputs["Rotation"].default_value
-    # what is not scaled alike along x and y is another world when it is turned
+    # Where x and y are scaled differently, a turn of the node is not a turn of the light.
     turns = scale[0] == scale[1] and not any(place) and not any(rotation[:2])
     return dial, mapping if turns else None
 
 
 def read(world: bpy.types.World) -> tuple[float, float, list[bpy.types.Node]]:
-    """The strength and turn that stand for all of a world, and the sockets that say so."""
+    """Read the strength and the turn of all light of a world, and the sockets that hold them.
+
+    Without such a socket, the strength is 1 and the turn 0.
+    """
     background, mapping = whole(world)
     sockets = []
     strength, turn = 1.0, 0.0
@@ -225,7 +238,7 @@ def read(world: bpy.types.World) -> tuple[float, float, list[bpy.types.Node]]:
 
 @contextmanager
 def _still_copy(world: bpy.types.World) -> Iterator[bpy.types.World]:
-    """A copy of a world as it is now, without its animation."""
+    """Copy a world as it is now, without its animation; the copy is removed at the end."""
     copy = world.copy()
     try:
         for block in (copy, copy.node_tree):
@@ -238,7 +251,10 @@ def _still_copy(world: bpy.types.World) -> Iterator[bpy.types.World]:
 
 @contextmanager
 def without_dials(world: bpy.types.World) -> Iterator[tuple[bpy.types.World, float, float]]:
-    """A copy of the world as it is now without its strength and turn, and those two."""
+    """Copy a world as it is now, with a strength of 1 and a turn of 0 -> (copy, strength, turn).
+
+    The copy is removed at the end.
+    """
     with _still_copy(world) as plain:
         strength, turn, _ = read(plain)
         background, mapping = whole(plain)
@@ -251,9 +267,10 @@ def without_dials(world: bpy.types.World) -> Iterator[tuple[bpy.types.World, flo
 
 @contextmanager
 def turned(world: bpy.types.World, angle: float) -> Iterator[bpy.types.World]:
-    """A copy of a world, turned about the vertical by so many radians, as its slider would.
+    """Copy a world and turn the copy about the vertical, as the slider would.
 
-    Raises SceneError for one that cannot be turned.
+    angle: in radians, added to the world's turn. The copy is removed at the end. Raises SceneError
+    for a world that cannot be turned.
     """
     with _still_copy(world) as copy:
         if why := why_not_turned(copy):

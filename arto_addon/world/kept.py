@@ -1,8 +1,7 @@
-"""Worlds that were brought to a map before: kept on disk, by what they are.
+"""Maps of worlds, kept on disk by a key of what the world shows.
 
-How bright a world is and how it is turned about the vertical is told apart from what it shows: a
-map is kept of what it shows, and the two are put to it. So an HDRI that is turned, or dimmed, is
-rendered once.
+The strength of a world and its turn about the vertical are not in the key. They are applied to the
+kept map. So an HDRI that is turned or dimmed is rendered only once.
 """
 
 from __future__ import annotations
@@ -27,11 +26,11 @@ from .bake import bake
 from .check import check_world
 from .dials import read, without_dials
 
-# A map counts for this version of how maps are made.
+# The version of how maps are made. Maps of another version are not used.
 VERSION = 1
-# So many maps stay, the ones that were used last.
+# How many maps stay on disk: those that were used last.
 MOST = 12
-# The last map stays in memory too, if it has no more bytes: a turntable shows nothing else.
+# The last map also stays in memory up to so many bytes, as a turntable needs only this map.
 LAST = 1 << 27
 _last: dict[str, Any] = {}
 
@@ -42,9 +41,9 @@ def environment(
     view_layer: str | None = None,
     world: bpy.types.World | None = None,
 ) -> Environment:
-    """The light of a view layer's world: `bake`, or the map that was made of it before.
+    """The light of a view layer's world, from a kept map where there is one, else from `bake`.
 
-    world: another than the layer's. Raises what `bake` raises.
+    world: the world to show (default: the view layer's). Raises what `bake` raises.
     """
     world = world or check_world(scene, view_layer)
     with without_dials(world) as (plain, strength, turn):
@@ -65,11 +64,10 @@ def environment(
 def painted(
     scene: bpy.types.Scene, mask: bpy.types.Image, width: int, world: bpy.types.World
 ) -> np.ndarray:
-    """How white each texel of a world's `environment` was painted on its HDRI, (width / 2, width),
-    from 0 to 1.
+    """Bring a mask that was painted on a world's HDRI to a map -> (width / 2, width), 0 to 1.
 
-    mask: an image that lies on the HDRI as that lies on the sky. Raises SceneError where the world
-    has not one HDRI alone.
+    The map fits the world's `environment` before its turn. mask: an image that is mapped to the sky
+    as the HDRI is. Raises SceneError unless the world's own tree has exactly one HDRI.
     """
     with without_dials(world) as (plain, _, _):
         found = [n for t in trees(shader_tree(plain), set()) for n in t.nodes]
@@ -92,14 +90,14 @@ def _read(path: Path, width: int) -> np.ndarray | None:
         image = arrays.read(path, width // 2 * width * 3 * 4)
         os.utime(path, follow_symlinks=False)
     except (OSError, ValueError, NotImplementedError):
-        return None  # it is made again
+        return None  # The map is made again.
     good = image.dtype == np.float32 and image.shape == (width // 2, width, 3)
     return image if good and np.isfinite(image).all() else None
 
 
 def _write(path: Path, image: np.ndarray) -> None:
-    """Keep a map, where there is room for it; the oldest ones go."""
-    with contextlib.suppress(OSError):  # it is made again then
+    """Keep a map on disk, and remove the maps that were not used for longest."""
+    with contextlib.suppress(OSError):  # A map that cannot be kept is made again next time.
         path.parent.mkdir(parents=True, exist_ok=True)
         arrays.write(path, image)
         kept = [p for p in path.parent.glob("*.npy") if arrays.is_signed(p)]
@@ -108,11 +106,11 @@ def _write(path: Path, image: np.ndarray) -> None:
 
 
 def _key(scene: bpy.types.Scene, world: bpy.types.World, width: int) -> str:
-    """What a map hangs on, in sixteen letters."""
+    """The key of a map: a digest of all that the map depends on."""
     of: list[object] = [VERSION, width, bpy.app.version_string, working_space()]
-    # a copy of the world has another name
-    # by what is in the files: an HDRI may be replaced by one of the same size and time
+    # `full` reads the files: an HDRI may be replaced by a file of the same size and time.
     found = of_blocks([world], full=True)
+    # The world's name does not count, as a copy of the world has another name.
     of.append(sorted(("World" if k.startswith("World") else k, v) for k, v in found.items()))
     if moving_images(world):
         of.append((scene.frame_current, scene.frame_subframe))
@@ -131,9 +129,9 @@ def moving_images(world: bpy.types.World) -> bool:
 
 
 def shows(scene: bpy.types.Scene, world: bpy.types.World) -> tuple[str, float, float]:
-    """What a world shows, told apart from its strength and turn -> (key, strength, turn).
+    """Read what a world shows, apart from its strength and turn -> (key, strength, turn).
 
-    Quick, and nothing is changed or copied: for who looks many times a second.
+    Nothing is changed or copied, so this is quick enough for many calls a second.
     """
     strength, turn, dials = read(world)
     of: list[object] = [*sorted(of_blocks([world], without=dials).items())]

@@ -1,7 +1,7 @@
-"""The world's suns and lamps, rendered by themselves: sharp, and quick.
+"""Render the world's suns and lamps by themselves, which is sharp and quick.
 
-Cycles finds lamps well, which is why few samples are enough for them, and badly when they hide in a
-patch, which is why the field is better off without them.
+Cycles finds small lamps in a world well, so few samples are enough. In a capture, a lamp is a small
+part of a patch, which Cycles finds badly. So the field does not show the lamps' light.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from ..work import Steps
 
 
 def world_showing(on: Stage, shown: Environment, group: str = "") -> bpy.types.World:
-    """A world that shows a map, in a light group of its own where one is named."""
+    """Make a world that shows a map. group: the world's light group, or "" for none."""
     height, width = shown.image.shape[:2]
     image = on.made(
         bpy.data.images.new("ARTO Lamps", width, height, alpha=False, float_buffer=True)
@@ -50,29 +50,29 @@ def world_showing(on: Stage, shown: Environment, group: str = "") -> bpy.types.W
         world.node_tree.links.new(direction, mapping.inputs["Vector"])
         world.node_tree.links.new(mapping.outputs[0], texture.inputs["Vector"])
     world.lightgroup = group
-    # left to itself, Cycles takes a second for a map of 4096; twice as fine as the light finds the
-    # rims of its texels, which are blended
+    # Cycles' automatic choice takes a second for a map of 4096. A sampling map twice as fine as the
+    # light also finds the blended rims of the light's texels.
     world.cycles.sampling_method = "MANUAL"
     world.cycles.sample_map_resolution = 2 * width
     return world
 
 
-# Fewer samples of the lamps than this have no time to smooth an edge.
+# The least samples of the lamps: fewer leave edges rough.
 LEAST_SAMPLES = 4
 
 
 def lamp_samples(scene: bpy.types.Scene, share: float) -> int:
-    """Samples of the render of lamps that have this share of the light."""
+    """How many samples lamps get that have this share of the world's light, 0 to 1."""
     return max(LEAST_SAMPLES, math.ceil(scene.arto.lamp_samples * share))
 
 
 def lamp_light(
     scene: bpy.types.Scene, field: Field, lamps: Environment, samples: int, share: float = 0.0
 ) -> Steps:
-    """Render what `lamps` bring to the picture of a field -> (H, W, 3), scene-linear.
+    """Render the light of `lamps` on the picture of a field -> (H, W, 3), scene-linear.
 
-    Zero outside the field's tiles; share: how far the whole work is. Raises SceneError,
-    CancelledError; the scene stays as it is.
+    The light is 0 outside the field's region. share: how much of the whole work was done before,
+    0 to 1. The artist's scene is not changed. Raises SceneError, CancelledError.
     """
     region = field.region
     out: NDArray[np.float32] = np.zeros((*field.shape, 3), np.float32)
@@ -83,14 +83,15 @@ def lamp_light(
     return out
 
 
-# Samples of the small picture that a field's brightness is held against.
+# Samples of the small picture with which a field's brightness is compared.
 HELD_SAMPLES = 96
 
 
 def brightness(scene: bpy.types.Scene, field: Field, light: Environment, share: float) -> Steps:
-    """Render, small, what a map brings to the picture of a field -> (3,), its mean radiance.
+    """Render a field's picture in the light of a map, small -> (3,), the mean radiance.
 
-    Raises SceneError, CancelledError; the scene stays as it is.
+    share: how much of the whole work was done before, 0 to 1. The artist's scene is not changed.
+    Raises SceneError, CancelledError.
     """
     with _lit_by(scene, field, light) as (on, group), small(on, HELD_SAMPLES):
         parts = yield from parts_of(on, "looking how bright the world's light is", share)
@@ -101,7 +102,7 @@ def brightness(scene: bpy.types.Scene, field: Field, light: Environment, share: 
 def _lit_by(
     scene: bpy.types.Scene, field: Field, shown: Environment
 ) -> Iterator[tuple[Stage, str]]:
-    """A stage of a field's picture with a map as its world, and the light group of that."""
+    """Make a stage of a field's picture, lit by a map -> (stage, the map's light group)."""
     with ExitStack() as held:
         about = field.about
         if about.view_layer is None:
@@ -111,10 +112,10 @@ def _lit_by(
         on = held.enter_context(stage(scene, about.view_layer))
         if about.catchers:
             held.enter_context(take(rendered(on), about.take or WHOLE))
-        # whatever the artist looks at meanwhile: the field is Cycles'
+        # The field was rendered by Cycles, whatever engine the artist works with now.
         on.change("render.engine", "CYCLES")
         prepare(on, layers=0)
-        # a render like any of the artist's: what tames its fireflies does no harm to a field
+        # Clamping as in the artist's renders. This render is not fitted, so clamping does no harm.
         for name in ("sample_clamp_direct", "sample_clamp_indirect"):
             on.change(f"cycles.{name}", getattr(scene.cycles, name))
         group = free_mark() + "lamps"
@@ -125,7 +126,10 @@ def _lit_by(
 
 
 def _light_in(parts: dict[str, NDArray], group: str) -> NDArray[np.float32]:
-    """The light of a group in a render's parts, (H, W, 3). Raises SceneError."""
+    """Take the light of a light group from a render's parts -> (H, W, 3).
+
+    Raises SceneError where the light is missing or has pixels that are not finite.
+    """
     light = next((p for name, p in parts.items() if name.endswith(group)), None)
     if light is None:
         raise SceneError(

@@ -1,4 +1,4 @@
-"""The scene's own lamps in a relit picture: how much of each light group is shown."""
+"""The scene's own lamps in a relit picture, with a gain for each of their light groups."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from ...core.preview import own_light
 
 
 def gains_of(settings: Any) -> dict[str, float]:
-    """How much of each light group of the scene's own lamps is shown."""
+    """The gain of each light group of the scene's own lamps, by name; 0 for a hidden group."""
     return {group.name: group.gain if group.show else 0.0 for group in settings.own_groups}
 
 
 def own_of(scene: bpy.types.Scene, field: Field) -> NDArray[np.float32]:
-    """The light of the scene's own lamps in a field, as the settings have it -> (H, W, 3)."""
+    """The light of the scene's own lamps in a field, with the settings' gains -> (H, W, 3)."""
     return own_light(field, scene.arto.own_lamps, gains_of(scene.arto))
 
 
 def sync(scene: bpy.types.Scene, field: Field) -> None:
-    """Have an entry in the settings for each light group that a field knows; others go."""
+    """Make the settings' list of light groups match the field's: add missing, remove others."""
     there = {name.removeprefix("own_") for name in field.own_layers}
     groups = scene.arto.own_groups
     for i in reversed(range(len(groups))):

@@ -1,4 +1,4 @@
-"""The studio: a scene of nothing but the artist's world, in which the world can be rendered."""
+"""The studio: a scene with only the artist's world, in which the world can be rendered."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from ..work import Render, blocking_render
 def studio_scene(
     scene: bpy.types.Scene, world: bpy.types.World, name: str
 ) -> Iterator[tuple[bpy.types.Scene, list[bpy.types.ID]]]:
-    """A new scene with a world of the artist's, the scene's frame and nothing else; removed at the
-    end.
+    """Make a new scene with a copy of the artist's world, at the artist's frame.
 
-    Yields the scene and the list of data-blocks to remove with it.
+    Yields the new scene, and a list: data-blocks that are added to the list are removed with the
+    scene at the end.
     """
     studio = bpy.data.scenes.new(name)
     made: list[bpy.types.ID] = []
@@ -31,7 +31,7 @@ def studio_scene(
         studio.render.engine = "CYCLES"
         studio.world = world.copy()
         made.append(studio.world)
-        # nothing is lit here, so no map of where the light comes from is needed
+        # Nothing is lit here, so Cycles needs no map for importance sampling.
         studio.world.cycles.sampling_method = "NONE"
         studio.frame_set(scene.frame_current, subframe=scene.frame_subframe)
         studio.cycles.device = scene.cycles.device
@@ -49,7 +49,7 @@ def studio_scene(
 
 
 def render(studio: bpy.types.Scene) -> NDArray[np.float32]:
-    """Render a studio scene -> (H, W, 4) float32, rows top-down."""
+    """Render a studio scene -> (H, W, 4) float32, rows top-down. Raises CancelledError."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "picture.exr"
         write_to(studio.render, path)
