@@ -1,4 +1,7 @@
-"""`blender scene.blend --command arto VERB`: the same work, with options; and a farm's parts."""
+"""The command line: `blender scene.blend --command arto VERB`.
+
+The verbs do what the buttons do, with settings as options. Others do the parts of a farm's job.
+"""
 
 from __future__ import annotations
 
@@ -95,14 +98,14 @@ def _parser() -> argparse.ArgumentParser:
         one.add_argument(
             "--openjd", action="store_true", help="say the progress as Open Job Description has it"
         )
-    # what the window starts
+    # these two are started by the window
     jobs.add_parser("job").add_argument("task", type=Path)
     jobs.add_parser("maps")
     return parser
 
 
 def _frames(text: str) -> range:
-    """`1-24`, `1-100:5`, `7`."""
+    """The frames that a text names, as in `1-24`, `1-100:5` or `7`."""
     match = re.fullmatch(r"(-?\d+)(?:-(-?\d+))?(?::(\d+))?", text)
     first, last, step = match.groups() if match else ("0", "-1", "1")
     found = range(int(first), int(last or first) + 1, int(step or 1) or 1)
@@ -112,7 +115,7 @@ def _frames(text: str) -> range:
 
 
 def _add_option(parser: argparse.ArgumentParser, setting: Setting) -> None:
-    """An option for a setting, as the setting describes itself."""
+    """Add an option for a setting, with the setting's kind, choices and description."""
     option: dict[str, Any] = {"default": None, "help": setting.words.replace("%", "%%")}
     if setting.kind in ("choice", "choices"):
         option["choices"] = [identifier for identifier, _, _ in setting.items]
@@ -126,7 +129,7 @@ def _add_option(parser: argparse.ArgumentParser, setting: Setting) -> None:
 
 
 def main(arguments: list[str]) -> int:
-    """Run one job; the exit code."""
+    """Run the verb that the arguments name; returns the exit code."""
     try:
         options = vars(_parser().parse_args(arguments))
     except SystemExit as e:
@@ -202,13 +205,16 @@ def main(arguments: list[str]) -> int:
 
 
 def _failed(error: ArtoError) -> int:
-    """Say why; the exit code."""
+    """Print an error; returns the exit code."""
     print(f"ARTO: {error}", file=sys.stderr)
     return 130 if isinstance(error, CancelledError) else 1
 
 
 def _of_a_farm(verb: str, options: dict[str, Any]) -> int:
-    """A part of a job, or what joins them: its settings are the job's; the exit code."""
+    """Render a part of a farm's job, or gather the parts; returns the exit code.
+
+    The settings are those of the job.
+    """
     folder = options["job"].resolve()
     try:
         if verb == "gather":
@@ -221,13 +227,13 @@ def _of_a_farm(verb: str, options: dict[str, Any]) -> int:
             print(f"openjd_fail: {e}", flush=True)
         return _failed(e)
     for path in made if isinstance(made, list) else [made]:
-        # what render managers look for
+        # render managers look for this line
         print(f"Saved: '{path}'", flush=True)
     return 0
 
 
 class OpenJDLines:
-    """Progress in the lines that an Open Job Description session reads."""
+    """Prints progress in the lines that an Open Job Description session reads."""
 
     def __call__(self, step: Progress | Render) -> None:
         print(f"openjd_progress: {100 * step.share:.1f}\nopenjd_status: {step.text}", flush=True)

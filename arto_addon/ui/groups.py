@@ -1,4 +1,4 @@
-"""Groups of the world's light, which get layers of their own: their list."""
+"""The list of groups of the world's light. Each group gets its own layer."""
 
 from __future__ import annotations
 

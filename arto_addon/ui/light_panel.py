@@ -74,7 +74,7 @@ def _live(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
     row.prop(switch, "live", toggle=True, icon="LIGHT_SUN")
     row.prop(scene.arto, "live_finish", text="", icon="CHECKMARK")
     row.prop(switch, "overlay", text="", icon="MESH_CUBE")
-    # always a line, so that nothing below it jumps
+    # always draw a line, so that what is below does not jump
     if live.current is not None:
         say(column, context, live.current.trouble or live.current.line)
     elif live.trouble:
@@ -89,7 +89,7 @@ def _live(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
 
 
 def lamps_line(scene: bpy.types.Scene) -> str:
-    """What the last plate says of the HDRI's suns."""
+    """What the last plate's header says of the HDRI's suns."""
     try:
         header = exr.header(paths.relit_file(scene))
     except (ArtoError, OSError):
@@ -121,7 +121,7 @@ def mixer_of(scene: bpy.types.Scene) -> bpy.types.Node | None:
 
 
 def _layers(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Gains and tints of the plate's layers: the mixer's own, where there is one."""
+    """Draw gains and tints of the plate's layers: the mixer's, where the compositor has a mixer."""
     node = mixer_of(context.scene)
     if node is None or context.scene.arto.layers == "OFF":
         return
@@ -145,7 +145,7 @@ class ARTO_UL_looks(bpy.types.UIList):
         self, context, layout, _data, item, _icon, _active_data, _active_property, _index
     ) -> None:
         icon = 0
-        with contextlib.suppress(ArtoError):  # of a file that was never saved
+        with contextlib.suppress(ArtoError):  # a file that was never saved has no place for plates
             icon = thumbnails.of_plate(paths.relit_file(context.scene, item.name))
         row = layout.row(align=True)
         if icon:

@@ -1,4 +1,4 @@
-"""What the artist makes lists of: looks, groups of the light, groups of the scene's lamps."""
+"""The entries of the artist's lists: looks, groups of the world's light, groups of lamps."""
 
 # pyright: reportInvalidTypeForm=false
 # Blender reads properties from annotations.
@@ -82,5 +82,5 @@ class ArtoLamps(bpy.types.PropertyGroup):
     )
 
 
-# By the setting that holds a list of them.
+# The type of a list's entries, by the setting that holds the list.
 ENTRIES = {"looks": ArtoLook, "own_groups": ArtoLamps, "groups": ArtoGroup}

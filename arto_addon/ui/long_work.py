@@ -1,4 +1,4 @@
-"""An operator over long work: in batch here and now, behind a button as a job."""
+"""The base of operators that do long work: at once in a script, as a job behind a button."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..work import ProgressLines, Steps, run
 
 
 class LongWork(bpy.types.Operator):
-    """See the module. `verb` names the work for a job, `steps` is it."""
+    """An operator that does long work: `steps` is the work, `verb` its name for a job."""
 
     verb: Verb
 
@@ -23,13 +23,15 @@ class LongWork(bpy.types.Operator):
         lines = ProgressLines(self.bl_label.lower())
         try:
             run(self.steps(context.scene, layer_of(context.scene)), lines)
-        except ArtoError as e:  # cancelled too: whoever waits for the result must not go on
+        except (
+            ArtoError
+        ) as e:  # also where it was cancelled: a script must not go on without the result
             self.report({"ERROR"}, str(e))
             return {"CANCELLED"}
         return {"FINISHED"}
 
     def check(self, scene: bpy.types.Scene) -> None:
-        """Raise an ArtoError for what can be seen at once."""
+        """Raise an ArtoError for mistakes that can be found before a job starts."""
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if bpy.app.background:
@@ -40,7 +42,7 @@ class LongWork(bpy.types.Operator):
             before = scene.arto.scene_id
             session.start(self.verb, scene, layer)
             if scene.arto.scene_id != before:
-                # an undo to before it would lose what is captured by it
+                # an undo step with the new ID: undoing past it would lose the capture made under it
                 bpy.ops.ed.undo_push(message="ARTO Scene ID")
         except ArtoError as e:
             self.report({"ERROR"}, str(e))

@@ -1,4 +1,4 @@
-"""Clicking into pictures: a pixel of the plate, a place of the HDRI."""
+"""Operators that wait for a click into a picture: a pixel of the plate, a place of the HDRI."""
 
 from __future__ import annotations
 
@@ -20,8 +20,10 @@ from .reveal import reveal
 def under(
     context: bpy.types.Context, event: bpy.types.Event
 ) -> tuple[bpy.types.SpaceImageEditor, float, float] | None:
-    """The image editor under the mouse, and where in its picture it is: u, v from the left and the
-    bottom, 0 to 1."""
+    """The image editor under the mouse, and where the mouse is in the editor's picture.
+
+    -> (space, u, v), u and v from the left and the bottom, 0 to 1; None outside.
+    """
     for area in context.window.screen.areas:
         if area.type != "IMAGE_EDITOR" or area.spaces.active.image is None:
             continue
@@ -52,7 +54,7 @@ class _Picking(Quick):
         return can_relight(cls, context)
 
     def begin(self, context: bpy.types.Context) -> None:
-        """Before the click. Raises ArtoError."""
+        """Show the picture to click into. Raises ArtoError."""
 
     def picked(
         self, context: bpy.types.Context, space: bpy.types.SpaceImageEditor, u: float, v: float
@@ -79,7 +81,7 @@ class _Picking(Quick):
             self._leave(context)
             return {"CANCELLED"}
         if event.type != "LEFTMOUSE" or event.value != "PRESS":
-            # zooming and panning go on
+            # zooming and panning stay possible
             return {"PASS_THROUGH"}
         there = under(context, event)
         if there is None:

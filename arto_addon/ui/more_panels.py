@@ -1,4 +1,4 @@
-"""The closed panels: frames, layers, storage, and for who asks for them the method's own words."""
+"""The closed panels: frames, layers, storage, and the method's own words where asked for."""
 
 from __future__ import annotations
 

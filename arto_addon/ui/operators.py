@@ -1,4 +1,4 @@
-"""The operators: the hemicube, capture, fit, relight, and what belongs to a shot."""
+"""The operators: hemicube, capture, fit, relight, and those that keep a shot's files."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ from .long_work import LongWork
 
 
 def free(cls: type) -> bool:
-    """Whether nothing of ARTO's runs; a button that has to wait says what for."""
+    """Whether no work of ARTO runs. A greyed button says what it waits for."""
     if text := session.busy():
         cls.poll_message_set(text)
     return not text
 
 
 class Quick(bpy.types.Operator):
-    """An operator that ends at once; typed errors become reports."""
+    """An operator that ends at once: `work` returns its report, a typed error becomes one."""
 
     def work(self, context: bpy.types.Context) -> str:
         raise NotImplementedError
@@ -211,7 +211,7 @@ whose frames were captured, or of an animated world over a still"""
 
 
 def can_relight(cls: type, context: bpy.types.Context) -> bool:
-    """Whether there is a world, and a capture to show in it."""
+    """Whether there is a world, and a capture to show in its light."""
     if world_of(context.scene) is None:
         cls.poll_message_set("The scene has no world to relight with: add one with an HDRI")
         return False
@@ -219,7 +219,7 @@ def can_relight(cls: type, context: bpy.types.Context) -> bool:
 
 
 def there(cls: type, context: bpy.types.Context, folder: str, name: str, say: str) -> bool:
-    """Whether a file of the shot's is on disk; else say what to do first."""
+    """Whether a file of the shot is on disk; if not, the button says what to do first."""
     scene = context.scene
     try:
         place = paths.place(scene, layer_of(scene), fresh=bpy.app.background)

@@ -1,7 +1,7 @@
 """The overlay: the patches that the light comes from, drawn around the scene in the 3D viewport.
 
-Nothing of it is in the scene. The patches are drawn at twice the scene's radius: the captured ones
-are a thousand radii away, where nobody sees them.
+The overlay adds nothing to the scene. Its patches are drawn at twice the scene's radius: the
+captured patches are a thousand radii away, too far to be seen.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from ..world.check import world_of
 
 _handle: list[Any] = []
 _drawn: dict[str, Any] = {}
-# Who makes maps of the world while Live is off.
+# What makes maps of the world while Live is off: none or one.
 _maps: list[Maps] = []
 # Seconds between looks at the world.
 EVERY = 0.3
@@ -38,7 +38,7 @@ def shown() -> bool:
 
 
 def switch(on: bool) -> None:
-    """Draw it, or not."""
+    """Switch the overlay on or off."""
     if on and not _handle and not bpy.app.background:
         _handle.append(bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_VIEW"))
         bpy.app.timers.register(_follow, first_interval=0.1)
@@ -63,7 +63,7 @@ def _redraw() -> None:
 
 
 def _follow() -> float | None:
-    """Have a map of the world made where nobody else has one, and draw again when it changes."""
+    """Have a map of the world made while Live makes none; draw again when the light changes."""
     if not _handle:
         return None
     scene = bpy.context.scene
@@ -77,14 +77,14 @@ def _follow() -> float | None:
     elif live.current is None and map_of(scene) is None:
         if not _maps:
             _maps.append(Maps())
-        # what cannot light anything is said where it is relit
+        # relighting reports a world that cannot light the scene; the overlay need not
         with contextlib.suppress(ArtoError):
             _maps[0].ask(scene, layer_of(scene), world, key[0], False)
     return EVERY
 
 
 def map_of(scene: bpy.types.Scene) -> Environment | None:
-    """The light of the scene's world, as far as it is at hand."""
+    """The light of the scene's world; None where no map of the world is made yet."""
     world = world_of(scene)
     if world is None:
         return None
@@ -98,7 +98,7 @@ def map_of(scene: bpy.types.Scene) -> Environment | None:
 
 
 def hemicube_of(scene: bpy.types.Scene) -> Hemicube | None:
-    """The captured patches of a scene's shot, else those that its settings ask for."""
+    """The patches that the shot was captured with, else those that the settings ask for."""
     try:
         field = status.field_of(paths.place(scene, layer_of(scene), fresh=False).source)
         if field is not None:
@@ -109,7 +109,7 @@ def hemicube_of(scene: bpy.types.Scene) -> Hemicube | None:
 
 
 def middle_of(scene: bpy.types.Scene) -> tuple[np.ndarray, float]:
-    """The middle and the radius of what the viewport has of the scene."""
+    """The middle and the radius of the scene as the viewport has it."""
     corners = [
         tuple(thing.matrix_world @ Vector(corner))
         for thing in scene.objects
@@ -124,7 +124,7 @@ def middle_of(scene: bpy.types.Scene) -> tuple[np.ndarray, float]:
 
 
 def triangles(hemicube: Hemicube, middle: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Of each patch two triangles, and its four edges -> (6 K, 3), (8 K, 3) in the world."""
+    """Two triangles and four edges of each of K patches -> (6 K, 3), (8 K, 3), world space."""
     faces, edges = [], []
     for k in range(len(hemicube)):
         a, b, c, d = hemicube.corners(k) * size + middle
@@ -134,7 +134,7 @@ def triangles(hemicube: Hemicube, middle: np.ndarray, size: float) -> tuple[np.n
 
 
 def colours(scene: bpy.types.Scene, hemicube: Hemicube) -> np.ndarray | None:
-    """Each patch's light as a display shows it, (K, 3); None where no map of the world is there."""
+    """Each patch's light as a display shows it, (K, 3); None without a map of the world."""
     environment = map_of(scene)
     if environment is None:
         return None
@@ -157,7 +157,7 @@ def _draw() -> None:
     found = colours(scene, hemicube)
     gpu.state.depth_test_set("LESS_EQUAL")
     gpu.state.blend_set("ALPHA")
-    # seen from inside and outside: what is behind is drawn faintly over the scene
+    # drawn faintly over the scene, since the patches may be between the viewer and the scene
     if found is not None:
         shader = gpu.shader.from_builtin("SMOOTH_COLOR")
         rgba = np.concatenate([found, np.full((len(found), 1), 0.35)], axis=1)
@@ -180,4 +180,4 @@ def unregister() -> None:
 
 
 def register() -> None:
-    """Nothing is drawn until it is switched on."""
+    """Do nothing: the overlay is drawn only once it is switched on."""

@@ -1,5 +1,7 @@
-"""Where ARTO's panels are: a tab in the sidebars of the 3D viewport, the image editor and the
-compositor, and the render properties, which have the closed ones too."""
+"""Where ARTO's panels are: in the sidebars and in the render properties.
+
+The sidebars are those of the 3D viewport, the image editor and the compositor.
+"""
 
 from __future__ import annotations
 
@@ -9,19 +11,19 @@ import bpy
 
 from .words import tr
 
-# Space, region, and what the names of panels there end in.
+# Space, region, and the end of the names of the panels there.
 SIDEBARS = (
     ("VIEW_3D", "UI", "view"),
     ("IMAGE_EDITOR", "UI", "image"),
     ("NODE_EDITOR", "UI", "nodes"),
 )
 TAB = "ARTO"
-# Of a letter in Blender's interface, pixels at a scale of 1, on average and with room to spare.
+# Average width of a letter in Blender's interface, in pixels at a scale of 1, rather too wide.
 _LETTER = 5.9
 
 
 class Draws:
-    """What a panel has in common with its like elsewhere: a title and `draw_column`."""
+    """What the panels of one title share in all places: the title and `draw_column`."""
 
     label = ""
     closed = False
@@ -38,7 +40,7 @@ class Draws:
 def panels(name: str, draws: type[Draws], sidebar: bool = True, parent: str = "") -> list[type]:
     """The panel classes of one title, one for each place.
 
-    sidebar: whether it is in the sidebars too; parent: name of the one it is in.
+    sidebar: whether the panel is in the sidebars too; parent: the name of the enclosing panel.
     """
     places: list[tuple[str, str, str]] = [*SIDEBARS] if sidebar else []
     places.append(("PROPERTIES", "WINDOW", "render"))
@@ -81,7 +83,7 @@ def _panel(name: str, draws: type[Draws], space: str, region: str, end: str, par
 def say(
     column: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE"
 ) -> None:
-    """A sentence, in as many lines as the region needs: a label is clipped at its end."""
+    """Draw a sentence in as many lines as the region needs: Blender clips a long label."""
     letters = _letters(context, icon != "NONE")
     lines = column.column(align=True)
     lines.scale_y = 0.8
@@ -92,14 +94,16 @@ def say(
 
 
 def _lines(text: str, letters: int) -> list[str]:
-    """A text in lines; one that has no blanks, as in Japanese, is broken anywhere, and its letters
-    are twice as wide."""
+    """Break a text into lines.
+
+    A text without blanks, as in Japanese, is broken anywhere, and its letters count twice.
+    """
     wide = any(ord(c) > 0x2E80 for c in text)
     return textwrap.wrap(text, letters // 2 if wide else letters) or [""]
 
 
 def shortened(context: bpy.types.Context, text: str) -> str:
-    """A text in one line, with dots where it is longer."""
+    """A text cut to one line, with dots where something was cut."""
     return textwrap.shorten(text[:1].upper() + text[1:], _letters(context), placeholder="…")
 
 
@@ -107,5 +111,5 @@ def _letters(context: bpy.types.Context, icon: bool = False) -> int:
     """How many letters a line of the region has room for."""
     scale = context.preferences.system.ui_scale
     room = (context.region.width if context.region else 300) / scale
-    # what the frame of a panel, its scroll bar, and an icon take
+    # less the room of the panel's frame, the scroll bar and an icon
     return max(12, int((room - 56 - (22 if icon else 0)) / _LETTER))

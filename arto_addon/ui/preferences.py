@@ -1,4 +1,4 @@
-"""ARTO's preferences: of the machine, not of a scene."""
+"""ARTO's preferences: they belong to the machine, not to a scene."""
 
 # pyright: reportInvalidTypeForm=false
 # Blender reads properties from annotations.
@@ -27,7 +27,7 @@ class ArtoPreferences(bpy.types.AddonPreferences):
 
 
 def research(context: bpy.types.Context) -> bool:
-    """Whether the method's own words are shown."""
+    """Whether the panel with the method's own words is shown."""
     addon = context.preferences.addons.get(ADDON)
     return bool(addon and addon.preferences and addon.preferences.research)
 

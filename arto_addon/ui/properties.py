@@ -1,4 +1,4 @@
-"""The settings on `scene.arto`, as Blender's properties, made of `settings.table`."""
+"""The settings on `scene.arto`: Blender properties made from `settings.table`."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ def _preset_chosen(self: ArtoSettings, context: bpy.types.Context) -> None:
         self["faces"] = sum(1 << FACE_NAMES.index(f) for f in PRESETS[self.preset])
         self["half_sides"] = self.preset == "paper"
         if self.preset == "paper":
-            # half a side cannot be split in four
+            # the preset's half sides cannot be split in four
             self["adaptive"] = False
 
 
 def _samples_chosen(self: ArtoSettings, context: bpy.types.Context) -> None:
-    # who says how many samples wants these: scripts say nothing else
+    # the samples count only with this quality, which a script would not set besides
     self.quality = "CUSTOM"
 
 
@@ -54,7 +54,7 @@ def _compare_chosen(self: ArtoSettings, context: bpy.types.Context) -> None:
     compare.update(self.id_data)
 
 
-# What follows when a setting is set.
+# What is called when a setting is set.
 _FOLLOWS = {
     "preset": _preset_chosen,
     "samples": _samples_chosen,
@@ -76,7 +76,7 @@ _PROPERTIES = {
 
 
 def _property(setting: Setting) -> Any:
-    """Blender's property of a setting, not yet registered."""
+    """Make Blender's property for a setting."""
     facts: dict[str, Any] = {
         "name": setting.title,
         "description": setting.words,

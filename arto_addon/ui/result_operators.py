@@ -1,4 +1,4 @@
-"""Buttons of the panel Result."""
+"""The operators behind the buttons of the panel Result."""
 
 from __future__ import annotations
 

@@ -19,14 +19,14 @@ from . import shot_panel, thumbnails
 from .places import Draws, say
 from .words import tr
 
-# Seconds for which what was found holds: a panel is drawn with every move of the mouse.
+# Seconds for which the line about the plate is kept: a panel is drawn at every mouse move.
 _HOLDS = 0.4
 _last: dict[str, tuple[float, tuple[str, bool]]] = {}
 _headers: dict[Path, tuple[int, dict]] = {}
 
 
 def header_of(path: Path) -> dict:
-    """The header of a plate, read when it has changed. Raises OSError, ExrError."""
+    """The header of a plate, read again only after the file changed. Raises OSError, ExrError."""
     changed = path.stat().st_mtime_ns
     if path not in _headers or _headers[path][0] != changed:
         if len(_headers) > 50:
@@ -36,7 +36,7 @@ def header_of(path: Path) -> dict:
 
 
 def plate_line(scene: bpy.types.Scene) -> tuple[str, bool]:
-    """What there is of a plate, in words, and whether it is up to date; empty for nothing."""
+    """A line about the plate, and whether the plate is up to date; empty without a plate."""
     key = f"{scene.session_uid} {scene.arto.look}"
     at, found = _last.get(key, (-1.0, ("", False)))
     now = time.monotonic()
@@ -90,7 +90,7 @@ class Result(Draws):
             say(column, context, text, "CHECKMARK" if good else "ERROR")
         row = column.row(align=True)
         row.scale_y = 1.3
-        # it stands out while there is something to do
+        # the button stands out while the plate is out of date
         row.alert = bool(text) and not good and session.current is None
         row.operator("arto.relight", icon="WORLD")
         if session.current is None:
@@ -123,7 +123,7 @@ class Result(Draws):
 
 
 def _short(path: Path) -> str:
-    """A path as a file of the artist's is called: from the .blend on."""
+    """A path as Blender shows it: relative to the .blend, where both are on one drive."""
     if bpy.data.filepath:
         try:
             return bpy.path.relpath(str(path))
@@ -133,13 +133,13 @@ def _short(path: Path) -> str:
 
 
 def _seen(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """What the last look inside found."""
+    """Draw what the last look inside found."""
     for line in context.window_manager.arto.seen.splitlines():
         say(column, context, line)
 
 
 def _verified(column: bpy.types.UILayout, context: bpy.types.Context, path: Path | None) -> None:
-    """What Verify found, if it was of this plate."""
+    """Draw what Verify found, where it verified this plate."""
     if path is None:
         return
     found = verify_file(path)

@@ -6,7 +6,7 @@ import bpy
 
 
 def reveal(image: bpy.types.Image) -> None:
-    """Show an image in an image editor that is open, else where a render would be shown."""
+    """Show an image in an open image editor; without one, where Blender would show a render."""
     if bpy.app.background:
         return
     area = editor()
@@ -19,7 +19,7 @@ def reveal(image: bpy.types.Image) -> None:
 
 
 def editor() -> bpy.types.Area | None:
-    """The image editor to show a picture in: one that shows a picture already comes first."""
+    """The image editor to show a picture in; an editor that already shows a picture comes first."""
     found = []
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:

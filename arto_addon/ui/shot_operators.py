@@ -1,4 +1,4 @@
-"""Buttons of the panels Shot and Light: the one button, the way back, looks, an HDRI."""
+"""The operators behind the panels Shot and Light: capture, set back, delete, looks, HDRI."""
 
 # pyright: reportInvalidTypeForm=false
 # Blender reads properties from annotations.

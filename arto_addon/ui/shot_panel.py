@@ -1,4 +1,4 @@
-"""The panel *Shot*: which picture, what there is of it, and one large button."""
+"""The panel *Shot*: which picture, whether it is captured, and one large button."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def _buttons(column: bpy.types.UILayout, context: bpy.types.Context, found: stat
         row.prop(scene.arto, "samples", text="")
     big = column.row(align=True)
     big.scale_y = 1.6
-    # what is there already stands back behind what is to be done
+    # the text of the button says what is to be done next
     text = bpy.app.translations.pgettext_iface(found.button, "Operator")
     big.operator("arto.shoot", text=text, icon="RENDER_STILL", translate=False)
     if "done" in " ".join(found.lines):
@@ -86,8 +86,11 @@ def _buttons(column: bpy.types.UILayout, context: bpy.types.Context, found: stat
 
 
 def running(column: bpy.types.UILayout, context: bpy.types.Context, job: SecondBlender) -> None:
-    """One bar over everything, what is done, and a cross: as high as the button that it stands for,
-    so that nothing below it jumps while a hand is on it."""
+    """Draw the progress of a job: a bar, what is being done, and a cross to cancel.
+
+    The bar is as high as the button that it replaces, so that what is below does not jump under the
+    mouse.
+    """
     column.separator(factor=0.5)
     column.label(text=shortened(context, session.plain(job.state.text)), translate=False)
     row = column.row(align=True)
@@ -103,7 +106,7 @@ def running(column: bpy.types.UILayout, context: bpy.types.Context, job: SecondB
 
 
 def ended(column: bpy.types.UILayout, context: bpy.types.Context, verbs: tuple[Verb, ...]) -> None:
-    """How the last piece of work ended, if it was one of these and went wrong or was stopped."""
+    """Draw how the last job ended, if its verb is one of these and it failed or was stopped."""
     found = session.outcome
     if found is None or found.verb not in verbs or found.level == "INFO":
         return

@@ -22,19 +22,22 @@ from ..stage.stage import picture_region
 from ..stage.takes import TAKES
 from .words import tr
 
-# Seconds of a path on one core, until one was measured on this scene.
+# Guess of the seconds that one core needs for a path, until it was measured on this scene.
 _GUESS = 5e-6
-# And of all that is no path: starting, probing, fitting the last tile.
+# Seconds for all other work: starting, probing, fitting the last tile.
 OTHERS = 8.0
-# All takes of a shot with shadow catchers last so much longer than one.
+# How many times longer all takes of a shot with shadow catchers last than one take.
 ALL_TAKES = 1.6
 
 
 @dataclass(frozen=True)
 class Told:
-    """kind: `blocked`, `none`, `unfinished`, `unfitted`, `ready`, `changed`, `elsewhere` (captured
-    of another camera, frame or size), `other` (captured for another file or scene); lines: at most
-    two; button: what the large one says."""
+    """What the artist is told of a shot.
+
+    kind: `blocked`, `none`, `unfinished`, `unfitted`, `ready`, `changed`, `elsewhere` (captured for
+    another camera, frame or size) or `other` (captured for another file or scene); lines: at most
+    two; button: the text of the large button.
+    """
 
     kind: str
     lines: tuple[str, ...]
@@ -42,7 +45,7 @@ class Told:
 
 
 def told(scene: bpy.types.Scene) -> Told:
-    """What there is of the scene's shot."""
+    """Find what has been captured of the scene's shot, and what to do next."""
     if scene.render.engine != "CYCLES":
         return Told("blocked", ("ARTO captures with Cycles:", "choose it as the engine"), "Capture")
     if scene.camera is None:
@@ -88,7 +91,7 @@ def told(scene: bpy.types.Scene) -> Told:
 
 
 def _elsewhere(then: Shot, now: Shot) -> str:
-    """How another shot of the scene differs from this one, as an artist says it."""
+    """How the captured shot differs from the present one, in an artist's words."""
     if then.camera != now.camera:
         text = "Captured through {then}, the camera is {now}"
         return tr(text, then=then.camera, now=now.camera)
@@ -111,22 +114,24 @@ def _shot(source: Path) -> Shot | None:
 
 
 def captured_shot(scene: bpy.types.Scene) -> Shot | None:
-    """The shot that what is there was captured of, or the nearest one of the scene. Raises
-    SceneError."""
+    """The shot that the capture on disk is of; without one, the nearest captured shot of the scene.
+
+    None where nothing was captured. Raises SceneError.
+    """
     layer = layer_of(scene)
     place = paths.place(scene, layer)
     return _shot(place.source) or paths.nearest(scene, layer)
 
 
 def _when(path: Path) -> str:
-    """When a file was written: the time today, the day before."""
+    """When a file was written: the time if today, else the day."""
     at, now = time.localtime(path.stat().st_mtime), time.localtime()
     same = at[:3] == now[:3]
     return time.strftime("%H:%M" if same else "%d %b", at)
 
 
 def price(scene: bpy.types.Scene, unfinished: bool = False) -> tuple[str, ...]:
-    """What a capture takes, in two lines: time, and disk. Raises nothing: a panel asks."""
+    """What a capture costs, in two lines: time, and disk space. It raises nothing, for panels."""
     try:
         found = most(scene)
         pixels = picture_region(scene).pixels
@@ -144,7 +149,7 @@ def price(scene: bpy.types.Scene, unfinished: bool = False) -> tuple[str, ...]:
 
 
 def _seconds(scene: bpy.types.Scene, paths_traced: int, unfinished: bool) -> tuple[float, bool]:
-    """How long, and whether it was measured on this shot."""
+    """The seconds that a capture takes, and whether they were measured on this shot."""
     try:
         source = paths.place(scene, layer_of(scene), fresh=bpy.app.background).source
     except (ArtoError, OSError):

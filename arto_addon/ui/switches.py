@@ -1,4 +1,4 @@
-"""What is of the window and in no file: switches, the world's dials, and what was looked at."""
+"""Properties that no file keeps: switches, the world's dials, and what was looked at."""
 
 # pyright: reportInvalidTypeForm=false
 # Blender reads properties from annotations.
@@ -36,7 +36,7 @@ def _set_live(self: ArtoWindow, on: bool) -> None:
         live.trouble = str(e)
 
 
-# named, because Blender reads annotations as texts, in which a lambda knows no module
+# functions with names: Blender evaluates annotations as text, where a lambda finds no module
 def _get_overlay(self: ArtoWindow) -> bool:
     return overlay.shown()
 
@@ -70,7 +70,7 @@ def _set_tint(self: ArtoWorld, colour: Sequence[float]) -> None:
 
 
 class ArtoWindow(bpy.types.PropertyGroup):
-    """Of the window."""
+    """Switches and results that belong to the window."""
 
     live: BoolProperty(
         name="Live",
@@ -92,7 +92,7 @@ class ArtoWindow(bpy.types.PropertyGroup):
 
 
 class ArtoWorld(bpy.types.PropertyGroup):
-    """A world's dials: of its own nodes where they are found, else of nodes that are put in."""
+    """A world's dials. They act on the world's own nodes, or on nodes that ARTO adds."""
 
     rotation: FloatProperty(
         name="Rotation",

@@ -19,7 +19,7 @@ _written: dict[str, int] = {}
 
 
 def of_plate(path: Path) -> int:
-    """The icon of a plate on disk; 0 where there is none, or no window to show it."""
+    """The icon of a plate on disk; 0 without a plate or without a window."""
     if not _pictures:
         return 0
     try:
@@ -40,11 +40,11 @@ def of_plate(path: Path) -> int:
 
 
 def _put(key: str, picture: NDArray[np.float32]) -> int:
-    """A picture (h, w, 4) as a display shows it, in an icon."""
+    """Put a picture (h, w, 4), in display values, into an icon -> the icon's number."""
     icon = _pictures[0].new(key)
     height, width = picture.shape[:2]
     side = max(height, width)
-    # an icon is square
+    # icons are square: centre the picture in an empty square
     square = np.zeros((side, side, 4), np.float32)
     top, left = (side - height) // 2, (side - width) // 2
     square[top : top + height, left : left + width] = picture
@@ -54,13 +54,13 @@ def _put(key: str, picture: NDArray[np.float32]) -> int:
 
 
 def displayed(pixels: NDArray) -> NDArray[np.float32]:
-    """A scene-linear picture (H, W, 3 or 4), small and as a display shows it -> (h, w, 4)."""
+    """Make a scene-linear picture (H, W, 3 or 4) small, in display values -> (h, w, 4)."""
     step = max(1, -(-max(pixels.shape[:2]) // WIDTH))
     h, w = pixels.shape[0] // step * step, pixels.shape[1] // step * step
     blocks = pixels[:h, :w].reshape(h // step, step, w // step, step, -1)
     small = blocks.mean(axis=(1, 3), dtype=np.float64)
     light = np.maximum(np.nan_to_num(small[..., :3], posinf=0, neginf=0), 0)
-    # a picture's middle is a display's, and its lights run out softly
+    # map the mean to a medium grey, and let bright light approach white softly
     light = light / (light + 0.6 * max(float(light.mean()), 1e-9) + 0.2)
     alpha = small[..., 3:4] if small.shape[-1] > 3 else np.ones_like(light[..., :1])
     return np.concatenate([light ** (1 / 2.2), np.clip(alpha, 0, 1)], axis=-1).astype(np.float32)

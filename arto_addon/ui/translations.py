@@ -1,6 +1,6 @@
-"""The panels in other languages: what an artist reads first, whole sentences with their values.
+"""The panels' texts in other languages: the texts read first, as sentences with places for values.
 
-A line: English, German, Japanese. What is in no line is shown in English.
+A line has English, German and Japanese. A text without a line is shown in English.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ Look '{look}', {time} | Stimmung „{look}“, {time} | ルック「{look}」{ti
 
 
 def table() -> dict[str, dict[tuple[str, str], str]]:
-    """By language: English, in the contexts that Blender looks it up in -> the word there."""
+    """Blender's table of translations: by language, from (context, English text) to the text."""
     out: dict[str, dict[tuple[str, str], str]] = {name: {} for name in _LANGUAGES}
     for line in _LINES.strip().splitlines():
         english, *others = (part.strip() for part in line.split("|"))

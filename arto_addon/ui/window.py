@@ -1,4 +1,4 @@
-"""What happens in the window besides the buttons: a finished plate is shown, ESC ends a job."""
+"""What the window does besides buttons: show a finished job's result, end a job at ESC."""
 
 from __future__ import annotations
 
@@ -34,8 +34,7 @@ def _scene_of(job: SecondBlender) -> bpy.types.Scene | None:
 
 
 def show_relit(job: SecondBlender) -> str:
-    """A relight has ended: put the plate, or its frames, into the file, if that is still open, and
-    show it."""
+    """Put an ended relight's plate or frames into the file, if still open, and show the plate."""
     path = Path(job.state.result)
     scene = _scene_of(job)
     if scene is None:
@@ -47,14 +46,13 @@ def show_relit(job: SecondBlender) -> str:
             image = present_frames(scene, path, frames_of(scene), job.light)
         else:
             image = present(scene, path, job.light)
-        if wanted:  # else the hand has moved on, and looks at something newer
+        if wanted:  # otherwise Live shows a newer light already
             reveal(image)
     return job.state.text
 
 
 def show_captured(job: SecondBlender) -> str:
-    """A capture has ended: its light groups come into the panel, and the shot in its light into the
-    window."""
+    """Bring the light groups of an ended capture into the panel, and show the shot in its light."""
     scene = _scene_of(job)
     if scene is not None:
         there = field_of(paths.place(scene, layer_of(scene)).source)
@@ -66,7 +64,7 @@ def show_captured(job: SecondBlender) -> str:
 
 
 def show_looks(job: SecondBlender) -> str:
-    """All looks were relit: each has its image and its node."""
+    """Give each relit look its image and its node in the compositor."""
     scene = _scene_of(job)
     if scene is None:
         return job.state.text
@@ -85,7 +83,7 @@ def show_looks(job: SecondBlender) -> str:
 
 
 def show_verified(job: SecondBlender) -> str:
-    """Show where the plate is off."""
+    """Show the picture of where the plate differs from the render."""
     scene = _scene_of(job)
     path = Path(job.state.result)
     if scene is not None and path == verify_file(paths.relit_file(scene)):
@@ -95,7 +93,7 @@ def show_verified(job: SecondBlender) -> str:
     return job.state.text
 
 
-# Pictures of the window: they are of no file, and a saved one has them not.
+# Images that only the window needs: they are removed before the file is saved.
 OURS = (inside.IMAGE, inside.FROM, compare.IMAGE)
 
 
@@ -124,8 +122,8 @@ def register() -> None:
     if not bpy.app.background:
         bpy.app.handlers.save_pre.append(_before_save)
     keys = bpy.context.window_manager.keyconfigs.addon
-    if keys:  # none without a window
-        # the last one to be asked: whatever else takes an ESC has it first
+    if keys:  # without a window there is no key configuration
+        # the window's keymap is asked last, so that anything else that uses ESC comes first
         keymap = keys.keymaps.new(name="Window", space_type="EMPTY")
         _keys.append((keymap, keymap.keymap_items.new("arto.cancel", "ESC", "PRESS")))
 

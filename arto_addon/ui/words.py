@@ -6,11 +6,11 @@ import bpy
 
 
 def tr(text: str, **values: object) -> str:
-    """The sentence in the language of the interface, with its values."""
+    """Translate a sentence to the language of the interface, then put its values in."""
     out = bpy.app.translations.pgettext_iface(text)
     if not values:
         return out
     try:
         return out.format(**values)
     except (KeyError, IndexError, ValueError):
-        return text.format(**values)  # of a translation that names another value
+        return text.format(**values)  # the translation names a value that is not given
