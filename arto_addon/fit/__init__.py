@@ -1,1 +1,1 @@
-"""Fitting what was captured of a shot, and the guides that its field carries (paper 5)."""
+"""Fit a shot's capture set to a field (paper 5), and denoise the guides that the field carries."""

@@ -1,4 +1,4 @@
-"""Fitting the scene's capture set (paper 5); the work itself is `core.fit`."""
+"""Fit the scene's capture set (paper 5). The calculation is in `core.fit`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..work import Progress, Steps
 
 
 def _is_fitted(captured: CaptureSet, folder: Path, choice: str, separate: bool) -> bool:
-    """Whether the field in a folder is what fitting would make."""
+    """Whether the field in a folder is what a fit with these settings would make."""
     try:
         about = Field(folder).about
     except FieldError:
@@ -37,10 +37,10 @@ def _fit_one(scene: bpy.types.Scene, captured: CaptureSet, target: Path) -> Step
 
 
 def fit(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
-    """Fit the scene's capture set to a reflectance field; returns its folder.
+    """Fit the scene's capture set to a reflectance field; returns the field's folder.
 
-    Raises CaptureSetError, ShotError, FieldError, PatternError, BusyError; a field that was there
-    stays until the new one is complete.
+    A shot with shadow catchers gets a field for each take. An old field stays until the new field
+    is complete. Raises CaptureSetError, ShotError, FieldError, PatternError, BusyError.
     """
     layer = view_layer or layer_of(scene)
     scene.view_layers[layer].update()
@@ -65,11 +65,12 @@ def fit(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
             f"anew: set Support back to '{captured.head.choice}', or capture again with "
             "Keep Basis Images on Always"
         )
-    # a capture set of the version before is read where it is; its field goes where fields are now
+    # A capture set of an earlier version is read where it is. Its field goes to the shot's folder.
     target = (paths.claim(scene, layer) if place.earlier else place.folder) / "field"
     with Lock(target.parent, f"fitting {shot_of(scene, layer).title}"):
         if captured.head.catchers:
-            # first, so that no field of everything is there without those beside it
+            # The fields of the other takes come first. So the field of the whole is never there
+            # without them.
             for name in takes.TAKES:
                 there = CaptureSet(folder.parent / name / "capture")
                 yield from _fit_one(scene, there, target.parent / name / "field")

@@ -1,4 +1,4 @@
-"""The guides of a field, its albedo and normals, which steer the denoiser of whatever it shows."""
+"""The guides of a field: its albedo and normals, which steer the denoiser of relit pictures."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ...core.field.writer import replace_layers, write_head
 from ..blender import denoise
 from ..work import Progress, Steps
 
-# From so many samples of a capture on, what is left of noise in its guides does no harm
+# With so many samples of a capture or more, the noise of its guides does no harm
 # (docs/accuracy.md).
 CLEAN_SAMPLES = 64
 
@@ -26,25 +26,27 @@ def guides_of(field: Field) -> dict[str, NDArray]:
 
 
 def clean(field: Field) -> bool:
-    """Whether a field's guides have next to no noise."""
+    """Whether a field's guides have next to no noise, by their samples or as they were denoised."""
     about = field.about
     return about.guides == CLEAN or (about.samples or 0) >= CLEAN_SAMPLES
 
 
-# What a field says of guides that were denoised when it was written.
+# What a field's description says of guides that were denoised when the field was written.
 CLEAN = "clean"
 
 
 def cleaned(scene: bpy.types.Scene, folder: Path) -> Steps:
-    """Denoise the guides of a new field, so that no relight has to, where the scene's relights are
-    denoised at all."""
+    """Denoise the guides of a new field, so that no relight has to.
+
+    Nothing is done where the setting `denoise` is off or this Blender cannot denoise.
+    """
     field = Field(folder)
     guides = guides_of(field)
     if not scene.arto.denoise or clean(field) or not guides or not denoise.available():
         return
     yield Progress(0.99, "denoising the guides")
     for name, pixels in guides.items():
-        # a normal is from -1 to 1, and a denoiser of pictures knows nothing below 0
+        # A normal is from -1 to 1, and the denoiser of pictures takes no numbers below 0.
         low, span = (-1.0, 2.0) if name == "normal" else (0.0, 1.0)
         noisy = ((pixels - low) / span).astype(np.float32)
         guides[name] = denoise.denoise({}, noisy, like=scene) * span + low
