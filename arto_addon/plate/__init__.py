@@ -1,1 +1,1 @@
-"""What is done with a relit picture: its files, its place in the compositor, and comparing it."""
+"""What is done with a relit picture: write, show in the compositor, composite and compare."""

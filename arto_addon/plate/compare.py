@@ -1,4 +1,4 @@
-"""The plate beside the last render: side by side, or with a wipe between them."""
+"""Compare the plate with the last render: side by side, or with a wipe between them."""
 
 from __future__ import annotations
 
@@ -16,12 +16,15 @@ from ..blender.pictures import put
 from ..shot import paths
 
 IMAGE = "ARTO Compare"
-# The two pictures, read once.
+# Plate and render by the scene's `session_uid`, kept so that moving the wipe reads no files.
 _pictures: dict[int, tuple[NDArray[np.float32], NDArray[np.float32]]] = {}
 
 
 def begin(scene: bpy.types.Scene) -> bpy.types.Image:
-    """Read plate and render, and compare them -> the image that shows it. Raises SceneError."""
+    """Read plate and render, and compare them -> the image that shows both.
+
+    Raises SceneError where there is no plate or no render, or where their sizes differ.
+    """
     path = paths.relit_file(scene)
     if not path.is_file():
         raise SceneError("there is no plate to compare: press Relight first")
@@ -39,7 +42,7 @@ def begin(scene: bpy.types.Scene) -> bpy.types.Image:
 
 
 def _last_render() -> NDArray[np.float32]:
-    """What Blender rendered last, (H, W, 4). Raises SceneError where it has rendered nothing."""
+    """Read Blender's last render -> (H, W, 4). Raises SceneError where there is none."""
     result = bpy.data.images.get("Render Result")
     settings = bpy.data.scenes.new("ARTO Output")
     try:
@@ -61,7 +64,7 @@ def _last_render() -> NDArray[np.float32]:
 
 
 def update(scene: bpy.types.Scene) -> bpy.types.Image | None:
-    """Show the comparison as its settings are now; None where none was begun."""
+    """Show the comparison by the settings as they are now; None where no comparison was begun."""
     found = _pictures.get(scene.session_uid)
     if found is None:
         return None
@@ -70,10 +73,13 @@ def update(scene: bpy.types.Scene) -> bpy.types.Image | None:
 
 
 def joined(plate: NDArray, render: NDArray, how: str, wipe: float) -> NDArray[np.float32]:
-    """The two pictures (H, W, 4) in one."""
+    """Join two pictures (H, W, 4) of the same size in one.
+
+    how: an item of the setting `compare`; wipe: the plate's share of the width, for WIPE.
+    """
     width = plate.shape[1]
     if how == "SIDE":
-        # the middle of each, at their size
+        # The middle half of each picture, not scaled.
         half = width // 2
         left = (width - half) // 2
         return np.concatenate(
@@ -88,7 +94,7 @@ def joined(plate: NDArray, render: NDArray, how: str, wipe: float) -> NDArray[np
 
 
 def forget() -> None:
-    """Let go of the pictures, and of the image that shows them."""
+    """Let go of all compared pictures, and remove the image that shows them."""
     _pictures.clear()
     image = bpy.data.images.get(IMAGE)
     if image is not None:

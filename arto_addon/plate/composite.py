@@ -1,4 +1,4 @@
-"""The scene's composite, without a render: where it is made of plates, footage and other files."""
+"""The scene's composite without a render, for composites of plates, footage and other files."""
 
 from __future__ import annotations
 
@@ -18,16 +18,20 @@ COMPOSITE = "ARTO Composite"
 
 
 def composite_file(scene: bpy.types.Scene) -> Path:
-    """Beside the plate, with the ending of the scene's output format. Raises SceneError."""
+    """The path of the composite: beside the plate, with the ending of the scene's output format.
+
+    Raises SceneError where the plate has no path.
+    """
     plate = paths.relit_file(scene)
     return plate.with_name(f"{plate.stem}_composite{scene.render.file_extension}")
 
 
 def save_composite(scene: bpy.types.Scene, view_layer: str) -> Steps:
-    """Write what the scene's compositor puts out; returns (the file).
+    """Write what the scene's compositor puts out; returns a tuple with the file's path.
 
-    It is for a job: in a Blender of its own the artist's last render stays what it is. Raises
-    SceneError where the scene has no compositor, or shows a render: only files are at hand here.
+    This is for a job. Compositing replaces the last render, and in a job that is not the artist's.
+    Raises SceneError where the scene has no compositor, or where the composite shows a render,
+    which a job does not have.
     """
     tree = compositor(scene)
     if tree is None:
@@ -52,8 +56,10 @@ def save_composite(scene: bpy.types.Scene, view_layer: str) -> Steps:
 
 
 def _composited(scene: bpy.types.Scene) -> NDArray[np.float32]:
-    """What the compositor puts out, (H, W, 4), in a copy of the scene in which nothing asks for a
-    render or writes a file."""
+    """Composite a copy of the scene -> (H, W, 4).
+
+    In the copy, no node asks for a render or writes a file.
+    """
     copy = scene.copy()
     made: list[bpy.types.ID] = [copy]
     try:
@@ -68,7 +74,7 @@ def _composited(scene: bpy.types.Scene) -> NDArray[np.float32]:
 
 
 def _renders(tree: bpy.types.NodeTree) -> str:
-    """The name of a node that shows a render and that the output hangs on; empty for none."""
+    """The name of a node that shows a render and leads to the output; empty for none."""
     found: list[bpy.types.Node] = [n for n in tree.nodes if n.bl_idname == OUTPUT]
     seen = set()
     while found:

@@ -1,7 +1,7 @@
-"""Footage: what was filmed, that a shot's things are put into.
+"""Footage: the filmed picture behind a shot's things.
 
-Blender reads it, as its compositor would: image, sequence or movie, in its colour space, at the
-scene's frame, brought to the picture's size.
+Blender's compositor reads the footage: an image, a sequence or a movie, in its own colour space, at
+the scene's frame, brought to the picture's size.
 """
 
 from __future__ import annotations
@@ -24,18 +24,21 @@ from ..blender.compositing import choose, compositor, darkroom, turned_off
 from ..blender.pictures import put
 from ..stage.stage import picture_size
 
-# How a picture of another shape fills the frame, by the camera's word for it.
+# How footage of another shape fills the frame: the compositor's name by the camera's name.
 _FILLS = {"STRETCH": "Stretch", "FIT": "Fit", "CROP": "Crop"}
-# No finer than so many times the picture: that is enough for footage of 8K in a preview.
+# Footage is read at most so many times finer than the picture: enough for 8K in a preview.
 _FINEST = 8
-# Of an image's user, what an image node of the compositor has too.
+# The properties that an image's user and an image node of the compositor share.
 _TIMING = ("frame_duration", "frame_start", "frame_offset", "use_cyclic", "use_auto_refresh")
 
 
 @dataclass(frozen=True)
 class Footage:
-    """source: an image or a movie clip; timing: what says which of its frames is seen when, an
-    image's user or node, or None; fills: how, of `_FILLS`."""
+    """A filmed picture, as the artist has set it up.
+
+    source: an image or a movie clip; timing: an image's user or node, which decides the frame that
+    is seen when, or None; fills: how the footage fills the frame, a key of `_FILLS`.
+    """
 
     source: Any
     timing: Any = None
@@ -46,10 +49,10 @@ class Footage:
         return self.source.name
 
     def read(self, scene: bpy.types.Scene) -> NDArray[np.float32]:
-        """The footage at the scene's frame -> (H, W, 3), scene-linear, of the picture's size. What
-        is seen of it is opaque, whatever alpha its file has.
+        """Read the footage at the scene's frame -> (H, W, 3), scene-linear, the picture's size.
 
-        Raises SceneError where Blender cannot read it, or it is no picture.
+        The footage counts as opaque, whatever alpha the file has. Raises SceneError where Blender
+        cannot read the footage, or where pixels are not finite.
         """
         data, display = self._windows(scene)
         frame = _with_overscan(scene, display)
@@ -58,7 +61,8 @@ class Footage:
         width, height = picture_size(scene)
         fine = _finer(_size(data), (width, height))
         found = self._composited(scene, (fine * width, fine * height), opaque=True)
-        # a picture of another size fades out at its rim, and its alpha, which was 1, with it
+        # Footage of another size fades out at its rim. Alpha was 1 before and fades out as well, so
+        # dividing by alpha takes the fading back.
         covered = found[..., 3:]
         rgb = np.divide(
             found[..., :3], covered, out=np.zeros_like(found[..., :3]), where=covered > 0
@@ -67,7 +71,7 @@ class Footage:
             not rgb.any()
             and not self._composited(scene, (width, height), opaque=False)[..., 3].any()
         ):
-            # what Blender cannot read is nothing to it, and it says no word
+            # Blender gives no error for footage that it cannot read: it shows black without alpha.
             raise SceneError(
                 f"Blender shows nothing of the footage '{self.name}' at frame "
                 f"{scene.frame_current}: look whether its file is there and whole"
@@ -83,7 +87,10 @@ class Footage:
     def _composited(
         self, scene: bpy.types.Scene, size: tuple[int, int], opaque: bool
     ) -> NDArray[np.float32]:
-        """What Blender's compositor shows of it in a frame of a size, (H, W, 4)."""
+        """Have Blender's compositor bring the footage to a size -> (H, W, 4).
+
+        size: width and height; opaque: set alpha to 1 before scaling.
+        """
         with darkroom("ARTO Footage") as on:
             scale = on.tree.nodes.new("CompositorNodeScale")
             choose(scale, "Type", "Render Size")
@@ -101,8 +108,10 @@ class Footage:
             return on.composite(scale.outputs["Image"], size, "reading the footage")
 
     def _picture(self, node: bpy.types.Node) -> bpy.types.NodeSocket:
-        """The picture among what a node puts out: of a file of layers there is the beauty. Raises
-        SceneError."""
+        """The socket of a node that gives the picture; for a file of layers, the whole picture.
+
+        Raises SceneError where a file of layers has no such layer.
+        """
         for name in ("Image", "Combined"):
             if name in node.outputs:
                 return node.outputs[name]
@@ -112,9 +121,9 @@ class Footage:
         )
 
     def _windows(self, scene: bpy.types.Scene) -> tuple[Box, Box]:
-        """The pixels that there are, and those of its frame.
+        """The data window and the display window of the footage.
 
-        Blender shows the pixels of an EXR alone, wherever they stand in its frame.
+        Blender shows only the data window of an EXR, wherever it stands in the display window.
         """
         file = self._file(scene)
         if file is not None and file.suffix.lower() == ".exr" and file.is_file():
@@ -124,7 +133,7 @@ class Footage:
         return data, data
 
     def _file(self, scene: bpy.types.Scene) -> Path | None:
-        """The file that is shown at the scene's frame, as far as that can be told."""
+        """The file that is shown at the scene's frame; None where the source is not such a file."""
         source = self.source
         if source.source not in {"FILE", "SEQUENCE"} or getattr(source, "packed_file", None):
             return None
@@ -145,7 +154,7 @@ class Footage:
         return now if now.is_file() else path
 
     def _placed(self, scene: bpy.types.Scene, data: Box, display: Box) -> NDArray[np.float32]:
-        """The footage where its pixels stand in its frame; black where it has none."""
+        """Read footage whose data window is not its frame; black where the frame has no pixels."""
         found = self._alone(scene, _size(data))
         frame = np.zeros((*_size(display)[::-1], 4), np.float32)
         frame[..., 3] = 1
@@ -166,8 +175,11 @@ class Footage:
             bpy.data.images.remove(image)
 
     def _alone(self, scene: bpy.types.Scene, size: tuple[int, int]) -> NDArray[np.float32]:
-        """Its pixels without their frame -> (H, W, 4), opaque. Where these stand elsewhere than in
-        its middle, Blender's compositor (5.2) shifts them."""
+        """Read the pixels of the data window alone -> (H, W, 4), opaque.
+
+        An EXR is read as an image, because Blender's compositor (5.2) shifts a data window that is
+        not in the middle of its display window.
+        """
         file = self._file(scene)
         if file is None or file.suffix.lower() != ".exr":
             return self._composited(scene, size, opaque=True)
@@ -200,7 +212,7 @@ class Footage:
         return node
 
     def missing(self) -> str:
-        """The file that it has not got, empty where all is there."""
+        """The path of the footage's file where the file is missing; else empty."""
         image = self.source
         if isinstance(image, bpy.types.Image) and (
             image.source not in {"FILE", "MOVIE"} or image.packed_file
@@ -211,14 +223,17 @@ class Footage:
 
 
 def _finer(there: tuple[int, int], wanted: tuple[int, int]) -> int:
-    """How many times finer than the picture footage is looked at: what is larger than the picture
-    is averaged, where Blender would take some of its pixels. Both are widths and heights."""
+    """How many times finer than the picture the footage is read, to be averaged afterwards.
+
+    Blender itself would only pick some pixels of larger footage. there, wanted: width and height of
+    the footage and of the picture.
+    """
     times = min(has / needs for has, needs in zip(there, wanted, strict=True))
     return min(max(round(times), 1), _FINEST)
 
 
 def _with_overscan(scene: bpy.types.Scene, frame: Box) -> Box:
-    """A frame of the size that is delivered, with the overscan that the scene's picture has."""
+    """Add the scene's overscan to the footage's frame, where it has the size without overscan."""
     more = scene.arto.overscan
     if _size(frame) != tuple(side - 2 * more for side in picture_size(scene)):
         return frame
@@ -227,15 +242,15 @@ def _with_overscan(scene: bpy.types.Scene, frame: Box) -> Box:
 
 
 def _size(box: Box) -> tuple[int, int]:
-    """Width and height."""
+    """The width and height of a box."""
     return box[2] - box[0] + 1, box[3] - box[1] + 1
 
 
 def _pixels(source: Any, file: Path | None) -> tuple[int, int]:
-    """Width and height of an image or clip; of a sequence those of a file of it."""
+    """The width and height of an image or clip; where Blender does not know them, of the file."""
     if min(source.size) or file is None or not file.is_file():
         return tuple(source.size)
-    with contextlib.suppress(RuntimeError):  # which is said where it is read
+    with contextlib.suppress(RuntimeError):  # `read` gives the error for a damaged file.
         image = bpy.data.images.load(str(file))
         try:
             return tuple(image.size)
@@ -245,8 +260,12 @@ def _pixels(source: Any, file: Path | None) -> tuple[int, int]:
 
 
 def footage(scene: bpy.types.Scene) -> Footage | None:
-    """The artist's: ARTO's setting, else what the camera has as its background, else the first
-    image or clip of the scene's compositor; None where there is none."""
+    """Find the artist's footage; None where there is none.
+
+    ARTO's setting comes first, then the camera's background, then the first image or clip in the
+    scene's compositor. Raises SceneError where the file is missing, or where the camera's
+    background is moved, turned, scaled or flipped.
+    """
     found = _chosen(scene) or _behind_camera(scene) or _in_compositor(scene)
     if found and (path := found.missing()):
         raise SceneError(f"the footage '{found.name}' is not at {path}: find it, or choose another")
@@ -263,10 +282,10 @@ def _chosen(scene: bpy.types.Scene) -> Footage | None:
 
 @dataclass(frozen=True)
 class _Timing:
-    """Of a sequence or movie that is chosen by itself: each frame shows the picture of its number.
+    """The timing of a sequence or movie in ARTO's setting: frame N shows picture N.
 
-    An image does not know how many pictures it has; of one that is not there nothing is shown,
-    which is said.
+    An image does not know how many pictures its sequence has, so the duration is very long.
+    `Footage.read` gives an error where a picture is missing.
     """
 
     frame_duration: int = 1_000_000

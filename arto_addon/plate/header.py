@@ -1,4 +1,4 @@
-"""What Blender writes into the header of a picture's EXR, for plates."""
+"""The header of a plate's EXR: the attributes that Blender would write."""
 
 from __future__ import annotations
 
@@ -11,8 +11,11 @@ from ..shot import home
 
 
 def header(scene: bpy.types.Scene) -> dict[str, object]:
-    """The attributes that Blender's own render of the scene would have, as the artist asks for them
-    (Output properties, Metadata); but for its render's time and memory, which there was none of."""
+    """The attributes that Blender's own render of the scene would have in its header.
+
+    The artist chooses them in Output properties, Metadata. Render time and memory are left out, as
+    a plate is not rendered.
+    """
     render = scene.render
     camera, digits = scene.camera, len(str(max(scene.frame_end, 1)))
     markers = [m for m in scene.timeline_markers if m.frame <= scene.frame_current]

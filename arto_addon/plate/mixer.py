@@ -1,7 +1,7 @@
 """The mixer: a compositor node group that adds up a plate's layers, each with a gain and a tint.
 
-Made once and then kept: what the artist set in it, or changed of it, stays. It needs no ARTO to
-work, only the file of the layers.
+The group is made once and then kept, so all that the artist sets or changes in the group stays. The
+group works without ARTO, and needs only the file of the layers.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ _BLACK, _WHITE = (0.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0, 1.0)
 
 
 def mixer(path: Path, name: str, share: bpy.types.Image | None = None) -> bpy.types.NodeTree:
-    """The node group of that name for the layers in a file.
+    """Make or update the node group of a name for the layers in a file.
 
-    share: of a plate with shadow catchers, see `plate.node_group`.
+    share: see `plate.node_group`.
     """
     image = show(path, name)
     tree = bpy.data.node_groups.get(name)
@@ -30,7 +30,7 @@ def mixer(path: Path, name: str, share: bpy.types.Image | None = None) -> bpy.ty
         tree = _new(name)
     source = tree.nodes.get(SOURCE)
     if source is None:
-        return tree  # the artist's own by now
+        return tree  # The artist has rebuilt the group, so it is left alone.
     source.image = image
     there = {socket.name for socket in tree.interface.items_tree if socket.in_out == "INPUT"}
     for layer in (n for n in exr.part_names(path) if n):
@@ -64,13 +64,13 @@ def _new(name: str) -> bpy.types.NodeTree:
 
 
 def _add(tree: bpy.types.NodeTree, source: bpy.types.Node, layer: str) -> None:
-    """Add a layer to the sum, with its sockets: its gain by its name, and its tint."""
+    """Add a layer to the sum, with two sockets: a gain with the layer's name, and a tint."""
     gain = tree.interface.new_socket(layer, in_out="INPUT", socket_type="NodeSocketFloat")
     gain.default_value, gain.min_value = 1.0, 0.0
     gain.description = "How much of this layer's light is seen"
     tint = tree.interface.new_socket(f"{layer} Tint", in_out="INPUT", socket_type="NodeSocketColor")
     tint.default_value = _WHITE
-    # where the group is in use already, new sockets stand at nothing
+    # In nodes that use the group already, new sockets do not get their default value.
     for other in places_of_groups():
         for node in other.nodes:
             if getattr(node, "node_tree", None) == tree:

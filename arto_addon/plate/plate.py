@@ -22,9 +22,10 @@ from .header import header
 IMAGE = "ARTO Relit"
 # The image node in a plate's group.
 SOURCE = "ARTO Relit"
-# And that of how much a plate with shadow catchers shows of what is behind.
+# The image node of the share, for a plate with shadow catchers: how much of the footage is seen.
 SHARE = "ARTO Catcher"
-# Of such a plate's header, of one that has layers, of one that is cropped: its copy that is not.
+# Attributes in a plate's header: the plate has shadow catchers; it has layers; it is cropped, and
+# the attribute names the copy with all pixels.
 CATCHER, LAYERS, CROPPED = "arto.shadow catchers", "arto.layers", "arto.full window"
 
 
@@ -35,10 +36,12 @@ def write(
     about: dict[str, str],
     shows: bool = False,
 ) -> None:
-    """Write the plate: (H, W, 4) scene-linear, premultiplied. The header names its colour space,
-    and has what Blender's own render of the scene would have in it.
+    """Write a picture of a plate.
 
-    shows: whether a node group of ours does: then it is there with all its pixels, too.
+    The header names the colour space, and has the attributes of Blender's own render of the scene.
+    picture: (H, W, 4), scene-linear, premultiplied; about: more attributes, by the names after
+    `arto.`; shows: whether a node group of ARTO's shows the file. A cropped file then gets a copy
+    with all pixels.
     """
     window = window_of(scene)
     exr.write(path, {"": picture}, *header_of(scene, about), window)
@@ -48,73 +51,80 @@ def write(
 
 
 def window_of(scene: bpy.types.Scene) -> Window:
-    """How the settings want pictures to stand in their files."""
+    """The windows that the settings ask for in a plate's files."""
     return Window(scene.arto.overscan, scene.arto.data_window == "CROP")
 
 
 def full_file(path: Path) -> Path:
-    """Beside a file that is cropped: the same with all its pixels.
+    """The path of the copy with all pixels, beside a cropped file.
 
-    Blender's image is the data window, wherever that stands, and its compositor puts one that is
-    not in the middle of its display window upside down: as far below as it should be above (5.2).
+    Blender needs the copy. Its image has only the data window, wherever that stands in the display
+    window. Its compositor (5.2) mirrors the place of a data window that is not in the middle: as
+    far below as it should be above.
     """
     return path.with_name(f"{path.stem}_full.exr")
 
 
 def shown_file(path: Path, header: dict[str, object]) -> Path:
-    """What Blender shows of a file of a plate that has this header."""
+    """The file that Blender shows for a plate's file: the copy, where the header says cropped."""
     return full_file(path) if CROPPED in header else path
 
 
 def header_of(scene: bpy.types.Scene, about: dict[str, str]) -> tuple[dict[str, object], str]:
-    """A plate's header and colour space."""
+    """The attributes of a plate's header, and the name of its colour space."""
     attributes = header(scene) | {f"arto.{k}": v for k, v in about.items()}
     return attributes, working_space()
 
 
 def share_file(path: Path) -> Path:
-    """Beside a plate with shadow catchers: how much of what is behind it is seen, by colour."""
+    """The path of the share, beside a plate with shadow catchers: how much of the footage is seen.
+
+    The share has three colours.
+    """
     return path.with_name(f"{path.stem}_catcher.exr")
 
 
 def light_file(path: Path) -> Path:
-    """Beside a plate with shadow catchers: the light that its things add to the ground."""
+    """The path of the light that the things add to the ground, beside a plate with catchers."""
     return path.with_name(f"{path.stem}_light.exr")
 
 
 def layers_file(path: Path) -> Path:
-    """Beside a plate: what each part of its light gives to it."""
+    """The path of the layers, beside a plate: the picture in each part of the light."""
     return path.with_name(f"{path.stem}_layers.exr")
 
 
 def world_file(path: Path) -> Path:
-    """Beside a plate: the world that a mix of its layers is rendered with."""
+    """The path of the world of a mix, beside a plate: renders of the scene get the mix's light."""
     return path.with_name(f"{path.stem}_world.exr")
 
 
 def data_file(path: Path) -> Path:
-    """Beside a plate: what a denoiser or a compositor knows a picture by."""
+    """The path of the data, beside a plate: albedo, normals, depth, positions, Cryptomattes."""
     return path.with_name(f"{path.stem}_data.exr")
 
 
-# Of the layers of that file, the letters of their channels.
+# By the layers of the data file: the letters of the layer's channels.
 DATA = {"albedo": "RGB", "normal": "XYZ", "depth": "Z", "position": "XYZ"}
-# Of its header: what of this there is not.
+# The attribute in the header of the data file that names the missing layers.
 MISSING = "arto.missing"
 
 
 def write_data(
     scene: bpy.types.Scene, path: Path, field: Field, about: dict[str, str]
 ) -> list[str]:
-    """Write what a field knows of a plate beside its light, as 32-bit floats, a part each; and the
-    Cryptomattes of the artist's own render, where the settings name it. Returns what the field does
-    not know. Raises SceneError where the render is of another size; ExrError."""
+    """Write a plate's data file: the data layers of a field, and the artist's Cryptomattes.
+
+    Each layer is a part of 32-bit floats. The Cryptomattes come from the artist's own render, where
+    the settings name one. Returns the names of the layers that the field does not have. Raises
+    SceneError where the render has another size; ExrError.
+    """
     parts: dict[str, dict[str, NDArray]] = {}
     missing = [name for name in DATA if not field.has_layer(name)]
     for name, letters in DATA.items():
         if field.has_layer(name):
             pixels = field.layer(name).reshape(*field.shape, -1)
-            if name == "depth":  # outside a render region
+            if name == "depth":  # 0 stands outside a render region, where no thing is seen.
                 pixels = np.where(pixels == 0, np.float32(NO_HIT), pixels)
             parts[name] = {c: pixels[..., i] for i, c in enumerate(letters)}
     attributes, _ = header_of(scene, about)
@@ -133,18 +143,18 @@ def write_data(
 
 
 def comp_file(path: Path) -> Path:
-    """Beside a plate with shadow catchers: it in the artist's footage."""
+    """The path of the things in the artist's footage, beside a plate with shadow catchers."""
     return path.with_name(f"{path.stem}_comp.exr")
 
 
 def name_of(scene: bpy.types.Scene, look: str | None = None) -> str:
-    """The name of the plate's image and node group: of this scene and look, and no other's."""
+    """The name of the plate's image and node group, which no other scene or look has."""
     name = paths.relit_name(scene, look)
     return f"ARTO {name}" if name else IMAGE
 
 
 def show(path: Path, name: str = IMAGE) -> bpy.types.Image:
-    """The image data-block of a plate, loaded anew."""
+    """Load a plate's file anew as Blender's image of a name, and return the image."""
     image = bpy.data.images.get(name)
     relative = bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
     if image is None:
@@ -155,9 +165,9 @@ def show(path: Path, name: str = IMAGE) -> bpy.types.Image:
     image.reload()
     image.colorspace_settings.name = working_space()
     image.alpha_mode = "PREMUL"
-    # the image editor shows it as it shows a render: exposure, AgX
+    # The image editor shows the plate like a render, with exposure and view transform.
     image.use_view_as_render = True
-    # the node group is enough of a user only once it is there
+    # The image must not be lost before a node group uses it.
     image.use_fake_user = True
     return image
 
@@ -165,9 +175,10 @@ def show(path: Path, name: str = IMAGE) -> bpy.types.Image:
 def node_group(
     image: bpy.types.Image, name: str = IMAGE, share: bpy.types.Image | None = None
 ) -> Any:
-    """The compositor node group that shows a plate; made once, then kept up to date.
+    """Make or update the compositor's node group that shows a plate.
 
-    share: of a plate with shadow catchers, which the group puts into footage.
+    share: for a plate with shadow catchers, the image of how much of the footage is seen. The group
+    then also puts the things into footage.
     """
     tree = bpy.data.node_groups.get(name)
     if tree is None or tree.bl_idname != "CompositorNodeTree":
@@ -189,8 +200,11 @@ def node_group(
 
 
 def add_footage(tree: bpy.types.NodeTree, things: Any, share: bpy.types.Image) -> None:
-    """To a group that shows a plate, if it has it not: footage goes in, and comes out behind the
-    things, a socket of the tree, and in their shadows."""
+    """Have a plate's node group put the things into footage; a group that does so is updated.
+
+    The group gets an input for the footage, and an output for the composite. things: the socket
+    in the group that gives the things; share: how much of the footage is seen.
+    """
     if SHARE in tree.nodes:
         tree.nodes[SHARE].image = share
         return

@@ -1,4 +1,4 @@
-"""Showing a plate in the scene's compositor."""
+"""Show a plate in the scene's compositor."""
 
 from __future__ import annotations
 
@@ -25,17 +25,16 @@ from .plate import (
     shown_file,
 )
 
-# What the name of a plate's mixer has after the plate's.
+# A plate's mixer has the plate's name with this ending.
 MIX = " Mix"
-# On a node of ours: the links that it took over, as JSON.
+# The custom property of ARTO's node that lists the links that the node took over, as JSON.
 TAKEN = "arto_taken"
 
 
 def present(scene: bpy.types.Scene, path: Path, look: str | None = None) -> bpy.types.Image:
-    """Show a plate that was written: its image, and its node in the scene's compositor.
+    """Show a written plate: load its image, and put its node into the scene's compositor.
 
-    look: that it was made for (default: the scene's now). In the window that is one step that can
-    be undone.
+    look: the plate's look (default: the scene's look now). In the window this is one undo step.
     """
     name = name_of(scene, look)
     header = exr.header(path)
@@ -61,10 +60,11 @@ def present(scene: bpy.types.Scene, path: Path, look: str | None = None) -> bpy.
 def present_frames(
     scene: bpy.types.Scene, first: Path, frames: Sequence[int], look: str | None = None
 ) -> bpy.types.Image:
-    """Show plates of frames, numbered as `many` numbers them, as a sequence: an image and its node,
-    which at each frame of the scene show that frame's.
+    """Show the plates of several frames as a sequence: an image, and a node in the compositor.
 
-    first: the first frame's file. They stand beside the plate of a single frame.
+    At each frame of the scene, image and node show the plate of that frame. They have other names
+    than those of a single frame's plate. first: the file of the first frame; frames: the frames'
+    numbers, as `relight.many` numbers the files.
     """
     name, header = f"{name_of(scene, look)} Frames", exr.header(first)
     image = show(shown_file(first, header), name)
@@ -78,7 +78,7 @@ def present_frames(
         image_of.source = "SEQUENCE"
         source.frame_duration = frames[-1] - frames[0] + 1
         source.frame_start = frames[0]
-        # a sequence counts its files from 1
+        # Blender counts the files of a sequence from 1.
         source.frame_offset = frames[0] - 1
         source.use_auto_refresh = True
     wire(scene, group)
@@ -86,11 +86,12 @@ def present_frames(
 
 
 def wire(scene: bpy.types.Scene, group: bpy.types.NodeTree) -> bpy.types.Node | None:
-    """Put the node group into the scene's compositor, seen through the viewer; return its node.
+    """Put a node group into the scene's compositor, and return its node.
 
-    What the compositor puts out stays what it was: an artist's tree gains the node, and a viewer
-    if it had none; a scene without a compositor gets one that passes its render on. A tree linked
-    from a library is left alone (-> None): the plate's node group can be added where it is made.
+    The output of the compositor does not change. An artist's tree gains the node, and a viewer of
+    the node if the tree had no viewer. A scene without a compositor gets one that passes the render
+    on. A tree that is linked from a library is left alone, and None is returned: the artist can add
+    the node group in the library's file.
     """
     tree = compositor(scene)
     if tree is None:
@@ -101,13 +102,13 @@ def wire(scene: bpy.types.Scene, group: bpy.types.NodeTree) -> bpy.types.Node | 
         out.location = (500, 0)
         tree.links.new(render.outputs["Image"], out.inputs["Image"])
     if not tree.is_editable:
-        return None  # a library's: an edit of it would be gone with the next save
+        return None  # The tree is a library's: an edit would not be saved.
     node = next(
         (n for n in tree.nodes if n.bl_idname == "CompositorNodeGroup" and n.node_tree == group),
         None,
     )
     if node is None:
-        # Blender knows no node's height before it is drawn
+        # Blender does not know a node's height before the node is drawn, so it is estimated.
         tall = {n.name: 80 + 24 * (len(n.inputs) + len(n.outputs)) for n in tree.nodes}
         below = min((n.location.y - max(n.height, tall[n.name]) for n in tree.nodes), default=0.0)
         node = tree.nodes.new("CompositorNodeGroup")
@@ -124,8 +125,11 @@ def wire(scene: bpy.types.Scene, group: bpy.types.NodeTree) -> bpy.types.Node | 
 
 
 def use(scene: bpy.types.Scene) -> None:
-    """Have the scene's compositor use the plate as its setting says: instead of the render that it
-    is of, or in a viewer alone. The mixer comes before the plate where layers are written."""
+    """Have the scene's compositor use the plate as the setting `use_in_compositor` says.
+
+    The plate takes the place of the render, or is seen in a viewer alone. Where layers are written,
+    the mixer is used instead of the plate's own node.
+    """
     tree = compositor(scene)
     if tree is None or not tree.is_editable:
         return
@@ -141,7 +145,7 @@ def use(scene: bpy.types.Scene) -> None:
 
 
 def _take_over(scene: bpy.types.Scene, tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:
-    """Link to a node what the render of the scene's view layer is linked to."""
+    """Have a node take over the links of the render of the scene's view layer, and note them."""
     taken = []
     layer = layer_of(scene)
     for render in tree.nodes:
@@ -150,7 +154,7 @@ def _take_over(scene: bpy.types.Scene, tree: bpy.types.NodeTree, node: bpy.types
         if render.layer != layer:
             continue
         for out in ("Image", "Alpha"):
-            # all of them first: a link that is replaced is gone
+            # The links are listed first, as linking a socket anew removes its old link.
             for to, socket in [(n.to_node, n.to_socket) for n in render.outputs[out].links]:
                 taken.append([render.name, out, to.name, socket.identifier])
                 tree.links.new(node.outputs[out], socket)
@@ -158,7 +162,10 @@ def _take_over(scene: bpy.types.Scene, tree: bpy.types.NodeTree, node: bpy.types
 
 
 def _give_back(tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:
-    """Put back what a node took over, where the artist has not linked it otherwise since."""
+    """Give the links that a node took over back to the render.
+
+    A socket that the artist has linked to another node since is left alone.
+    """
     for render, out, to, identifier in json.loads(node.get(TAKEN, "[]")):
         if render not in tree.nodes or to not in tree.nodes:
             continue

@@ -1,4 +1,4 @@
-"""Verify: a few samples of the truth, rendered as Blender would, beside the plate."""
+"""Verify: compare the plate with a few samples of a path-traced render of the scene."""
 
 from __future__ import annotations
 
@@ -26,15 +26,16 @@ SAMPLES = 16
 
 
 def verify_file(path: Path) -> Path:
-    """Beside a plate: where it differs from a render by more than noise."""
+    """The path of the verification, beside a plate: where it differs from a render."""
     return path.with_name(f"{path.stem}_verify.exr")
 
 
 def verify_plate(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
-    """Render two times a few samples of the scene, and hold its plate against them.
+    """Render the scene twice with a few samples, and compare the plate with both renders.
 
-    Returns the path of the picture that shows where it is off; what was found is in its header.
-    Raises SceneError where there is no plate or it is of another size, CancelledError.
+    Returns the path of a picture that marks where the plate is off by more than noise. The header
+    of the picture has the result in words. Raises SceneError where there is no plate, where its
+    size differs from a render's, or where pixels are not finite; CancelledError.
     """
     layer = view_layer or layer_of(scene)
     path = paths.relit_file(scene)
@@ -52,7 +53,7 @@ def verify_plate(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps
             on.change("cycles.use_adaptive_sampling", False)
             on.change("cycles.use_denoising", False)
             on.change("cycles.time_limit", 0.0)
-            # the plate has all its light; a render that leaves some out would be off by that
+            # The plate has all light. A clamped render would leave light out and differ by that.
             on.change("cycles.sample_clamp_direct", 0.0)
             on.change("cycles.sample_clamp_indirect", 0.0)
             on.change("render.use_crop_to_border", False)
@@ -72,14 +73,14 @@ def verify_plate(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps
     found = verify(there[..., :3], renders[0][..., :3], renders[1][..., :3], own=ratio)
     told = {"verify": said(scene, found), "samples": f"2 x {SAMPLES}"}
     out = verify_file(path)
-    # whole, whatever the plate's windows are: it is looked at here and nowhere else
+    # All pixels are written, whatever the plate's windows: only Blender shows this file.
     exr.write(out, {"": marked(there, found)}, *plate.header_of(scene, told))
     yield Progress(1.0, told["verify"])
     return out
 
 
 def said(scene: bpy.types.Scene, found: Verdict) -> str:
-    """What was found, in a sentence or two."""
+    """Say in a sentence or two what was found."""
     text = f"{found.line}; mean difference {found.error:.1%}, noise {found.noise:.1%}"
     settings = scene.arto
     if settings.own_lamps != 1 or any(gain != 1 for gain in gains_of(settings).values()):
