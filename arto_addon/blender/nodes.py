@@ -29,16 +29,17 @@ class Nodes:
         return node
 
     def math(self, operation: str, *inputs: Any) -> Any:
+        """Add a Math node, and return its output socket."""
         return self.add("ShaderNodeMath", *inputs, operation=operation).outputs[0]
 
 
 def new_material(name: str) -> bpy.types.Material:
-    """A material with the nodes that Blender gives it."""
+    """Make a material with Blender's default nodes."""
     return _noded(bpy.data.materials.new(name))
 
 
 def new_world(name: str) -> bpy.types.World:
-    """A world with the nodes that Blender gives it."""
+    """Make a world with Blender's default nodes."""
     return _noded(bpy.data.worlds.new(name))
 
 

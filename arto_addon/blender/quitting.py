@@ -1,4 +1,4 @@
-"""What is to be done when Blender quits."""
+"""Handlers that are called when Blender quits."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Which picture of which scene, and where what belongs to it is kept."""
+"""The shot, which is a picture of a scene, and where the shot's files are kept."""

@@ -57,7 +57,7 @@ _evaluated: dict[int, str] = {}
 
 
 def forget(changed: Iterable[int] | None = None) -> None:
-    """Drop the kept digests of the data-blocks with these `session_uid`s; of None, of all."""
+    """Drop the kept digests of data-blocks. changed: their `session_uid`s; None for all."""
     for kept in (_arrays, _evaluated):
         if changed is None:
             kept.clear()

@@ -196,7 +196,7 @@ _kept: dict[type, list[tuple[str, str, bool]]] = {}
 
 
 def _properties(kind: type, rna: Any) -> list[tuple[str, str, bool]]:
-    """(name, kind, whether an array) of the properties of a type that decide a picture."""
+    """List the properties of a type that may change a picture: (name, kind, whether an array)."""
     if kind not in _kept:
         out = []
         for prop in rna.properties:

@@ -38,13 +38,13 @@ class Pace:
 
 
 class Stage:
-    """The copied scene, and the data-blocks that live as long as it does."""
+    """The copied scene, and the data-blocks that are removed with the scene."""
 
     def __init__(self, scene: bpy.types.Scene) -> None:
         self.scene = scene
         self.changed: dict[str, list[object]] = {}
-        self.pace: Pace | None = None  # of the last small render
-        self.own_groups: list[str] = []  # the artist's light groups that have things in them
+        self.pace: Pace | None = None  # How fast the last small render was.
+        self.own_groups: list[str] = []  # The artist's light groups that have objects.
         self._made: list[bpy.types.ID] = []
 
     def made(self, block: Any) -> Any:

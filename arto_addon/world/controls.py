@@ -36,6 +36,7 @@ def set_turn(world: bpy.types.World, angle: float) -> None:
 
 
 def strength(world: bpy.types.World) -> float:
+    """How bright a world is, as the slider shows it; 1 where no socket scales the whole world."""
     socket = scaler(world)
     return socket.default_value if socket else 1.0
 
@@ -58,6 +59,7 @@ def set_strength(world: bpy.types.World, value: float) -> None:
 
 
 def tint(world: bpy.types.World) -> tuple[float, float, float]:
+    """The colour that multiplies a world's light, white where `set_tint` has added no node."""
     tree = shader_tree(world)
     node = tree.nodes.get(TINT) if tree else None
     return tuple(node.outputs[0].default_value[:3]) if node else (1.0, 1.0, 1.0)
