@@ -1,4 +1,4 @@
-"""What is asked of a capture, and the description that it begins with.
+"""What is asked of a capture, and the head that its capture set begins with.
 
 The artist's settings, the scene as it is now, and what decides whether two captures are the same.
 """
@@ -39,7 +39,7 @@ from .planned import Given, Planned, planned
 
 
 def geometry(scene: bpy.types.Scene, seen: Rendered) -> Hemicube:
-    """The hemicube to capture with: the artist's, where one was built, else a new one."""
+    """The hemicube to capture with: the artist's, if built in the scene, else a new hemicube."""
     bounds = seen.bounds()
     there = planes.built(scene)
     if there is None:
@@ -55,10 +55,13 @@ def geometry(scene: bpy.types.Scene, seen: Rendered) -> Hemicube:
 
 @dataclass(frozen=True)
 class Asked:
-    """A capture that was asked for, on its stage. hemicube: before it is refined; key: the same for
-    the very same capture alone; head: what it begins with, before anything is looked at; catchers:
-    whether there are shadow catchers, see `takes`; otherwise: the objects that the take has
-    otherwise than the artist."""
+    """A capture that was asked for, on its stage.
+
+    hemicube: before it is refined; key: two captures have the same key only if all that decides
+    their pictures is the same; head: the head before any probe; catchers: whether there are shadow
+    catchers, see `takes`; otherwise: the objects that the take shows in another way than the
+    artist's scene does.
+    """
 
     scene: bpy.types.Scene
     view_layer: str
@@ -78,7 +81,7 @@ class Asked:
 def asked(
     scene: bpy.types.Scene, view_layer: str, given: Given | None = None, name: Take = WHOLE
 ) -> Iterator[Asked]:
-    """Set the stage for a capture. given: see there; name: of the take. Raises SceneError."""
+    """Set the stage for a capture. given: see `Given`; name: the take. Raises SceneError."""
     settings = scene.arto
     region = picture_region(scene)
     found = fingerprint(scene, view_layer, full=True)
@@ -87,11 +90,11 @@ def asked(
         seen = rendered(on)
         otherwise = held.enter_context(take(seen, name))
         hemicube = given.hemicube if given else geometry(scene, seen)
-        # between renders the paths differ, and grain would not be theirs
+        # other routes need several renders, whose paths differ: no grain belongs to all
         grain = settings.grain and settings.route == Route.ALL
         patterns = pattern_set(settings.patterns)
         prepare(on, layers=len(patterns) + grain)
-        # one of hundreds of passes; the takes beside the first hand on nothing but light
+        # the other takes need light alone, and each pass less saves memory
         on.scene.view_layers[0].use_pass_position = name == WHOLE
         if name == THINGS:
             only_things(on.scene.view_layers[0])
@@ -112,7 +115,7 @@ def asked(
                 values(settings, Decides.CAPTURE) | {"route": Route(settings.route), "grain": grain}
             ),
         )
-        # names are not in it: a renamed file or scene goes on with what it has
+        # the key holds no names: a renamed file or scene goes on with its unfinished capture
         frame = [shot.camera_matrix, shot.lens, shot.frame, shot.subframe, shot.view_layer]
         everything: list[Any] = [
             head.to_json(),
@@ -136,11 +139,12 @@ def asked(
 def begun(
     this: Asked, folder: Path, given: Given | None, strips: int | None = None, takes: int = 1
 ) -> Steps:
-    """Look at the scene and plan the capture -> (`Planned`, the head of its capture set, with
-    no tile rendered yet).
+    """Look at the scene and plan the capture -> (`Planned`, the head of its capture set).
 
-    folder: where it will be; strips: into how many tiles the picture is cut (default: as the memory
-    says); takes: see `planned`. Raises SceneError.
+    The head has no rendered tile yet.
+
+    folder: where the set will be; strips: the number of tiles of the picture (default: as many as
+    memory makes necessary); takes: see `planned`. Raises SceneError.
     """
     settings = this.scene.arto
     plan: Planned = yield from planned(

@@ -1,5 +1,8 @@
-"""The takes of a shot with shadow catchers that stand beside the first: the catchers alone, and the
-things alone, in the light of the same patches (`stage.takes`)."""
+"""The takes beside the first, for a shot with shadow catchers (`stage.takes`).
+
+The first take shows everything. The others show the catchers alone and the things alone, in the
+light of the same patches.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +16,12 @@ from .planned import Given
 
 
 def given_by(head: CaptureHead) -> Given:
-    """What a capture set's head gives to the takes beside it. Raises CaptureSetError."""
+    """What the takes beside the first take over from its head. Raises CaptureSetError."""
     return Given(head.hemicube, head.told_route, head.caution)
 
 
 def is_there(folder: Path, key: str, pair: str | None) -> bool:
-    """Whether a folder has the finished take of that key, made for the first take `pair`."""
+    """Whether a folder has the finished take with this key, made for the first take `pair`."""
     with contextlib.suppress(ArtoError):
         head = CaptureSet(folder).head
         return head.key == key and head.pair == pair

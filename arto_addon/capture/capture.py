@@ -36,7 +36,7 @@ from .stream import Stream
 
 
 def check_file(path: Path, images: list[tuple[int, str]]) -> None:
-    """Raise CaptureSetError unless Blender wrote all of a render."""
+    """Raise CaptureSetError unless Blender wrote all images of a render into the file."""
     expected = {group_name(k, name) for k, name in images}
     found = set()
     for name in exr.part_names(path):
@@ -57,16 +57,18 @@ def capture(
 ) -> Steps:
     """Render the basis images of a scene into its capture set; returns the folder.
 
-    Where the settings keep no basis images, each tile is fitted as it comes, and the field takes
-    the place of the shot's. A set left unfinished by the same capture of the same scene is gone on
-    with; an earlier finished one stays until the new one is complete, and so do unfinished ones of
-    other settings. only_estimate: stop before the first long render; returns the `room.Estimate`;
-    given: see there. Raises SceneError, CaptureSetError, FieldError, PatternError, BusyError
-    (another process captures this shot), ExrError, CancelledError; the scene stays as it is, but
-    for the ID that its shots are found by.
+    Where the settings keep no basis images, each tile is fitted as it comes, and the new field
+    replaces the shot's. If the same capture of the same scene was stopped, this one goes on with
+    it. An earlier finished set stays until the new set is complete, and so do unfinished sets of
+    other settings. The scene does not change, except that it may be given the ID that its shots are
+    found by.
+
+    only_estimate: stop before the first long render, and return the `room.Estimate`; given: see
+    `Given`. Raises SceneError, CaptureSetError, FieldError, PatternError, BusyError (another
+    process captures this shot), ExrError, CancelledError.
     """
     check_scene(scene, view_layer)
-    # whatever a script has moved is where it should be
+    # let the scene follow what a script has moved
     scene.view_layers[view_layer].update()
     if scene.arto.keep == Keep.NEVER:
         check_choice(scene.arto.support, pattern_set(scene.arto.patterns), scene.arto.separate)
@@ -98,8 +100,8 @@ def _capture(
         steps = _capture_beside(scene, view_layer, claimed / name, name, head, stopped)
         found = yield from steps
         made += [found] if found else []
-    # all at the end, so that an earlier capture stays whole until then; the first one last, by
-    # which an interrupted end is gone on with
+    # Put all takes in place at the end: until then an earlier capture stays whole. The first take
+    # comes last: as long as it is unfinished, an interrupted end can be taken up again.
     for each in reversed(made):
         yield from _finish(scene, *each)
     if not this.catchers:
@@ -119,9 +121,11 @@ def _capture_beside(
     first: CaptureHead,
     stopped: bool,
 ) -> Steps:
-    """Render a take beside the one of everything, whose head is `first` -> where it is, where it
-    belongs, its head. stopped: whether this goes on with a capture that was stopped; then
-    None where the take is there already."""
+    """Render a take beside the first -> (its folder, the place to put it, its head).
+
+    first: the first take's head; stopped: whether this goes on with a capture that was stopped. In
+    that case None is returned for a take that is there already.
+    """
     given = beside.given_by(first)
     with asked(scene, view_layer, given, name) as this:
         folder = paths.unfinished_folder(place, this.key)
@@ -137,7 +141,7 @@ def _capture_beside(
 
 
 def _finish(scene: bpy.types.Scene, unfinished: Path, place: Path, head: CaptureHead) -> Steps:
-    """Put a complete take, and its field where it was fitted as it came, where the last one is."""
+    """Put a complete take in the last one's place; its field, if tiles were fitted as they came."""
     if not head.kept:
         finish_field(unfinished, place / "field", head)
         yield from cleaned(scene, place / "field")
@@ -145,14 +149,16 @@ def _finish(scene: bpy.types.Scene, unfinished: Path, place: Path, head: Capture
 
 
 def _render_tiles(on: Stage, folder: Path, head: CaptureHead) -> Steps:
-    """Render what is not there yet of a capture set, and fit it where it is not kept -> the head of
-    the complete set."""
+    """Render the missing tiles of a capture set -> the head of the complete set.
+
+    Where the settings keep no images, the tiles are fitted as well.
+    """
     tiles = len(head.tiles)
     stream = None if head.kept else Stream(folder)
     heads.write(folder, head)
 
     def take(patience: float | None) -> bool:
-        """Note down the tile that was fitted; whether one still is being fitted."""
+        """Note down the tile that was fitted -> whether a tile is still being fitted."""
         nonlocal head
         if stream and (ended := stream.ended(patience)):
             number, fitted = ended
@@ -197,16 +203,16 @@ def plan_of(head: CaptureHead) -> list[list[tuple[int, str]]]:
 def set_tile(
     on: Stage, head: CaptureHead, number: int, images: list[tuple[int, str]]
 ) -> AbstractContextManager[None]:
-    """The stage ready for a render of some images of a tile."""
+    """Make the stage ready to render some images of a tile."""
     set_region(on.scene, head.tiles[number].region)
-    # the scene's own lamps are in every render; the first shows them by group
+    # the scene's own lamps are in every render; the first render separates them by group
     sampled = head.route == Route.SAMPLED
     own = not sampled and images == plan_of(head)[0]
     return planes.lit(on, head.hemicube, head.patterns, images, sampled, own)
 
 
 def render_tile(on: Stage, head: CaptureHead, number: int, folder: Path) -> Steps:
-    """Render what is not there yet of a tile into a folder -> the names of its files."""
+    """Render the missing files of a tile into a folder -> the names of all its files."""
     plan, tiles = plan_of(head), len(head.tiles)
     total = len(plan) * tiles
     files = []
@@ -214,7 +220,7 @@ def render_tile(on: Stage, head: CaptureHead, number: int, folder: Path) -> Step
         at = number * len(plan) + i
         text = f"render {at + 1} of {total}: {len(images)} basis images"
         name = f"tile_{number:04d}.exr" if len(plan) == 1 else f"tile_{number:04d}_{i:04d}.exr"
-        # a process that was killed may have finished it without noting it down
+        # a killed process may have finished the file without noting it down
         if not is_whole(folder / name, images):
             work = Render(on.scene.name, at / total, text, 1 / total)
             around = set_tile(on, head, number, images)
@@ -224,13 +230,13 @@ def render_tile(on: Stage, head: CaptureHead, number: int, folder: Path) -> Step
 
 
 def is_whole(path: Path, images: list[tuple[int, str]]) -> bool:
-    """Whether the basis images of a render are there already."""
+    """Whether a file holds all basis images of a render."""
     if not path.is_file():
         return False
     try:
         check_file(path, images)
     except ArtoError:
-        return False  # rendered again
+        return False  # a missing or damaged file is rendered again
     return True
 
 
@@ -241,7 +247,7 @@ def _render(
     path: Path,
     request: Render,
 ) -> Steps:
-    """One render of some basis images into `path`; around: has their planes around the stage."""
+    """Render some basis images into `path`. around: puts their planes around the stage."""
     with whole(path) as partial:
         write_to(on.scene.render, partial)
         with around:

@@ -9,13 +9,15 @@ from ..stage.stage import picture_size
 from ..world.check import check_no_volume, world_of
 from .simulations import unbaked
 
-# Blender itself renders none smaller, denoising and the world behind included.
+# The fewest pixels on a side that Blender renders, with denoising and the world behind.
 LEAST_PIXELS = 4
 
 
 def check_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> None:
-    """Raise SceneError for settings that cannot be captured; what is rendered is asked on the stage
-    (`stage.bounds.Rendered.check`)."""
+    """Raise SceneError for settings that cannot be captured.
+
+    Objects are checked later, on the stage (`stage.bounds.Rendered.check`).
+    """
     if scene.render.engine != "CYCLES":
         raise SceneError(
             f"the render engine is {scene.render.engine}: ARTO captures with Cycles; choose it in "

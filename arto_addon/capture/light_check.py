@@ -1,8 +1,8 @@
-"""A check of the light itself, before the long render: do the patches light the scene as a world?
+"""A check of the light before the long render: do the patches light the scene as a world does?
 
-One small picture under all patches, and the same picture in a plain white world, twice. Whatever
-keeps the patches' light out that a world's is not kept from, a setting of the scene or a trick in
-its materials, known here or not, shows as a difference.
+A small picture is rendered under all patches, and twice in a plain white world. Some settings of a
+scene and some tricks in materials let a world's light in and keep the patches' light out. They show
+as a difference between the pictures, whether this module knows of them or not.
 """
 
 from __future__ import annotations
@@ -25,17 +25,16 @@ from ..world.lamp_render import world_showing
 from . import planes
 
 SAMPLES = 48
-# Of the white world's map, which has holes where the hemicube has.
+# Rows of the white world's map, which is black where the hemicube has no patch.
 HEIGHT = 256
 
 
 def check_light(on: Stage, hemicube: Hemicube) -> Steps:
     """Compare the light of the prepared stage's patches with a white world's.
 
-    -> (whether the patches must be sampled, a warning or None). Light that only shadow rays bring
-    reaches the picture from patches that they are cast at; then that is what is to be done, and the
-    warning says what it costs. A warning is a `Caution`.
-    Raises CancelledError; the stage is left as it was.
+    -> (whether the patches must be sampled, a `Caution` or None). Some light reaches the picture by
+    shadow rays alone. Patches must then be sampled: Cycles casts shadow rays at them. The caution
+    says what this costs. The stage is left as it was. Raises CancelledError.
     """
     seed = on.scene.cycles.seed
     black, through = on.scene.world, on.scene.cycles.transparent_max_bounces
@@ -45,7 +44,7 @@ def check_light(on: Stage, hemicube: Hemicube) -> Steps:
         expected = []
         try:
             on.scene.world = _white(on, hemicube)
-            # as many clear surfaces as in the artist's render
+            # light passes as many transparent surfaces as in the artist's render
             asked = on.changed.get("cycles.transparent_max_bounces", [through])[0]
             on.scene.cycles.transparent_max_bounces = asked
             for i in (1, 2):
@@ -76,7 +75,7 @@ def check_light(on: Stage, hemicube: Hemicube) -> Steps:
 
 
 def _of_patches(on: Stage, hemicube: Hemicube, own: np.ndarray, sampled: bool) -> Steps:
-    """The picture in the light of all patches and its own, (H, W, 3)."""
+    """Render the picture in the light of all patches and the scene's own lights, (H, W, 3)."""
     total = own
     images = [(k, "white") for k in range(len(hemicube))]
     most = planes.MOST_SAMPLED if sampled else len(images)
@@ -89,10 +88,10 @@ def _of_patches(on: Stage, hemicube: Hemicube, own: np.ndarray, sampled: bool) -
 
 
 def _white(on: Stage, hemicube: Hemicube) -> bpy.types.World:
-    """A white world, black in directions that no patch is in.
+    """A white world, black in directions where no patch is.
 
-    By a map, though it is one colour: a world that Cycles sees to be even is not sampled as a
-    light, and then is no more of a world than the patches are.
+    The world shows a map, though it has one colour: Cycles does not sample an even colour as a
+    light, so that such a world would have the same faults as the patches.
     """
     azimuth, latitude, _ = sample_directions(HEIGHT, 2 * HEIGHT, 1)
     there = hemicube.locate(directions(azimuth, latitude))[0] >= 0
@@ -102,7 +101,7 @@ def _white(on: Stage, hemicube: Hemicube) -> bpy.types.World:
 
 
 def _words(on: Stage, seen: Agreement) -> str:
-    """What is wrong and why it may be, for an artist; empty where nothing is."""
+    """Say to an artist what is wrong and what the cause may be; empty where nothing is wrong."""
     if seen.dark and seen.agrees:
         return (
             "no light from outside reaches the picture: every world will look the same. Is the "
@@ -122,9 +121,11 @@ def _words(on: Stage, seen: Agreement) -> str:
 
 
 def _tricks_shadows() -> bool:
-    """Whether there may be things that a world's light passes on its shadow rays and not on others,
-    or the other way: in the file, if not in this scene. What they do is soft, and a shadow that is
-    a tenth too dark on all of a ground is not let pass as noise."""
+    """Whether an object in the file is visible to shadow rays and not to others, or vice versa.
+
+    If so, the stricter threshold is used. The difference that such an object makes is soft, as a
+    shadow that is a tenth too dark on all of a ground, and could be taken for noise.
+    """
     return any(
         thing.type not in {"LIGHT", "CAMERA", "EMPTY"}
         and not thing.hide_render
@@ -135,7 +136,7 @@ def _tricks_shadows() -> bool:
 
 
 def _cause(on: Stage) -> str:
-    """The likeliest cause, by what the scene has."""
+    """The likeliest cause, judged by what the scene contains."""
     layer = on.scene.view_layers[0]
     if layer.material_override:
         return "the view layer overrides all materials"

@@ -11,7 +11,8 @@ from ...core.hemicube import Hemicube
 from ...core.region import Region
 from .planes import MOST_SAMPLED
 
-# Where tiles are not too thin they begin at a row of the picture that is one of all proxies.
+# Tiles that are not too thin begin at a row that is a multiple of this: there a row of every proxy
+# begins.
 ALIGNED = 8
 
 
@@ -26,14 +27,16 @@ def tiles_of(region: Region, bytes_a_pixel: int, budget: int) -> list[Region]:
         )
     count = -(-region.height // rows)
     if count > 1 and rows >= 4 * ALIGNED:
-        # their edges are moved by less than that
+        # aligning moves an edge by less than `ALIGNED` rows: leave room for that
         count = -(-region.height // (rows - ALIGNED))
     return strips_of(region, count)
 
 
 def strips_of(region: Region, count: int) -> list[Region]:
-    """Cut a region into so many strips, or as many as it has rows; where they are not too thin, a
-    pixel of a proxy is never of two."""
+    """Cut a region into `count` strips, or into as many as it has rows.
+
+    Strips that are not too thin are aligned: no pixel of a proxy is in two of them.
+    """
     count = min(count, region.height)
     edges = [region.height * i // count for i in range(count + 1)]
     if region.height >= 3 * ALIGNED * count:
@@ -49,8 +52,8 @@ def render_plan(
     """The (patch, pattern name) images of each render."""
     k = range(len(hemicube))
     if route == Route.SAMPLED:
-        # every pattern in renders of its own, whose paths are the same: the seed is, and the lights
-        # are where they were
+        # each pattern has its own renders; all trace the same paths, since they have the same seed
+        # and their lights stand in the same places
         some = [k[i : i + MOST_SAMPLED] for i in range(0, len(k), MOST_SAMPLED)]
         return [[(i, name) for i in part] for name in names for part in some]
     if route == Route.ALL:

@@ -20,24 +20,25 @@ from ..blender.nodes import Nodes, made_of_nodes, new_material
 from ..stage.stage import Stage, free_mark
 
 COLLECTION = "ARTO Hemicube"
-# Of a scene's radius: how far away the patches are that an artist looks at.
+# Distance of the patches that an artist looks at, in radii of the scene.
 VISIBLE = 2.0
 PATTERN = "arto_pattern"
 FAR = 1000.0
-# Patterns stand behind each other, each this much farther out: so near that a patch point keeps its
-# direction, so far that a ray cannot miss the gap (float32 at 1,000 radii).
+# The patterns of a patch stand behind each other, each farther out by this share. The gap is so
+# small that a point of the patch keeps its direction, and so wide that float32 at 1,000 radii does
+# not lose it.
 GAP = 1e-4
-# A shadow ray's light group has 8 bits in Cycles: of more than so many, some lose their light and
-# nothing says so.
+# Most light groups that shadow rays can tell apart: Cycles has 8 bits for them. With more groups,
+# some would lose their light without a message.
 MOST_SAMPLED = 255
 
 
 def wanted(scene: bpy.types.Scene, centre: Iterable[float], radius: float) -> Hemicube:
-    """The hemicube that the settings ask for around a scene of that centre and radius."""
+    """The hemicube that the settings ask for, around a scene with this centre and radius."""
     s = scene.arto
     angle = s.rotation
     if s.align == "camera" and scene.camera:
-        # the camera looks along its -Z; only its heading counts
+        # a camera looks along its -Z axis; only the heading about the vertical counts
         look = -scene.camera.matrix_world.col[2].to_3d()
         angle += math.atan2(-look.x, look.y)
     x, y, z = (float(along) for along in centre)
@@ -52,7 +53,7 @@ def wanted(scene: bpy.types.Scene, centre: Iterable[float], radius: float) -> He
     )
 
 
-# Grains along a patch's side: far finer than what a pixel's reflection spans.
+# Grains along a patch's side: far finer than the part of a patch that a pixel reflects.
 GRAINS = 2.0**14
 
 
@@ -72,12 +73,12 @@ def _polynomial(nodes: Nodes, coefficients: Iterable[float]) -> Any:
     for coefficient, term in zip(coefficients, terms, strict=True):
         if coefficient:
             total = nodes.math("MULTIPLY_ADD", term, float(coefficient), total)
-    # on a patch's rim u and v may be a last digit below 0, and no light is negative
+    # at a patch's rim rounding may put u or v below 0, and light must not be negative
     return nodes.math("MAXIMUM", total, 0.0)
 
 
 def _grain(nodes: Nodes) -> Any:
-    """1 on half of the grains, 0 on the others, without order."""
+    """A random value for each grain: 1 on half of the grains, 0 on the others."""
     scaled = nodes.add(
         "ShaderNodeVectorMath",
         nodes.add("ShaderNodeUVMap").outputs[0],
@@ -92,7 +93,7 @@ def _grain(nodes: Nodes) -> Any:
 
 
 def _radiance(nodes: Nodes, name: str, patterns: PatternSet) -> Any:
-    """What a pattern of the set (or `GRAIN`) emits, a socket or a value."""
+    """What a pattern of the set, or `GRAIN`, emits: a socket or a value."""
     if name == GRAIN:
         return _grain(nodes)
     return _polynomial(nodes, patterns.coefficients[patterns.patterns.index(name)])
@@ -101,8 +102,8 @@ def _radiance(nodes: Nodes, name: str, patterns: PatternSet) -> Any:
 def _shader(nodes: Nodes, radiance: Any) -> Any:
     """Emission, plus what lies behind.
 
-    What lies behind the last pattern is the background, and that is where Cycles adds the sun lamps
-    of the scene to rays that were scattered: an opaque patch would take away their mirror images.
+    The background lies behind the last pattern. There Cycles adds the scene's sun lamps to
+    scattered rays. An opaque patch would hide the suns' mirror images.
     """
     light = nodes.add("ShaderNodeEmission", (1, 1, 1, 1), radiance).outputs[0]
     behind = nodes.add("ShaderNodeBsdfTransparent").outputs[0]
@@ -112,8 +113,8 @@ def _shader(nodes: Nodes, radiance: Any) -> Any:
 def pattern_material(name: str, patterns: PatternSet, sampled: bool = False) -> Any:
     """Emission of a pattern of the set (or of `GRAIN`), plus what lies behind."""
     material = new_material(f"ARTO {name}")
-    # paths find the patches; no shadow ray is ever cast at them, so Cycles' limit of 255 light
-    # groups for sampled lights does not apply
+    # paths find the patches, and no shadow ray is cast at them: Cycles' limit of 255 light groups
+    # for sampled lights does not apply
     material.cycles.emission_sampling = "FRONT_BACK" if sampled else "NONE"
     tree = material.node_tree
     tree.nodes.clear()
@@ -127,11 +128,14 @@ def overriding_material(
 ) -> Any:
     """A view layer's material override, on the artist's objects; on a plane, its pattern.
 
-    Blender puts a view layer's material on every object, and no slot is asked. So the one material
-    looks at the object: a plane has the number of its pattern, from 1, as property `PATTERN`.
+    Blender puts the override on every object, whatever the object's slots hold. So one material
+    must serve all, and look at the object: a plane has the number of its pattern, from 1, as
+    property `PATTERN`.
     """
     material = override.copy()
-    material.cycles.emission_sampling = "FRONT_BACK" if sampled else "NONE"  # as above
+    material.cycles.emission_sampling = (
+        "FRONT_BACK" if sampled else "NONE"
+    )  # as in `pattern_material`
     tree = made_of_nodes(material)
     nodes = Nodes(tree)
     number = tree.nodes.new("ShaderNodeAttribute")
@@ -169,7 +173,7 @@ def _plane(name: str, corners: np.ndarray, material: Any, made: Callable[[Any], 
     mesh.materials.append(material)
     plane = made(bpy.data.objects.new(name, mesh))
     plane.visible_camera = False
-    # the scene's own sun must reach it through the patches
+    # the scene's own sun must reach the scene through the patches
     plane.visible_shadow = False
     plane.display_type = "WIRE"
     plane.hide_select = True
@@ -187,8 +191,8 @@ def build(
 ) -> None:
     """Fill `collection` with a plane for each (patch, pattern name) of `images`.
 
-    Each plane carries the light group of its image, by a name with that mark (see
-    `stage.free_mark`), or none without. `made` is told of every new data-block.
+    mark: part of the names of light groups (`stage.free_mark`); without a mark the planes get no
+    light group. made: called with every new data-block, which it returns.
     """
     images = list(images)
     used = list(dict.fromkeys(name for _, name in images))
@@ -213,10 +217,10 @@ def lit(
     sampled: bool = False,
     own: bool = False,
 ) -> Iterator[None]:
-    """The stage with the planes of these images around it and their light groups to write.
+    """Put the planes of some images around the stage, with light groups, for as long as it is open.
 
-    sampled: Cycles also casts shadow rays at the patches, as it does at a world; then there may be
-    `MOST_SAMPLED` of them. own: with the artist's light groups.
+    sampled: whether Cycles also casts shadow rays at the patches, as it does at a world; it can do
+    so for at most `MOST_SAMPLED` images. own: whether the artist's light groups are written too.
     """
     made: list[Any] = []
     images = list(images)
@@ -236,9 +240,10 @@ def lit(
         collection = note(bpy.data.collections.new("ARTO Capture"))
         on.scene.collection.children.link(collection)
         build(collection, hemicube, patterns, images, note, free_mark(), sampled)
-        # first: they are sampled, and of those Cycles can only tell the first groups apart
+        # the artist's groups come first: their lamps are sampled, and of the groups of sampled
+        # lights Cycles can only tell the first apart
         for name in on.own_groups if own else ():
-            if not GROUP.search(f"Combined_{name}"):  # one that is named like ours stays in `own`
+            if not GROUP.search(f"Combined_{name}"):  # a group named as ours stays in `own`
                 layer.lightgroups.add(name=name)
         for plane in collection.objects:
             layer.lightgroups.add(name=plane.lightgroup)
@@ -251,14 +256,17 @@ def lit(
 
 
 def build_for_artist(scene: bpy.types.Scene, hemicube: Hemicube, radius: float) -> Any:
-    """The hemicube in the artist's scene: to look at. It is not rendered there (it would hide the
-    world); capturing builds its own from the same geometry."""
+    """Put the hemicube into the artist's scene, to look at -> its collection.
+
+    It is not rendered there, because it would hide the world. A capture builds another hemicube
+    from the same geometry.
+    """
     remove_for_artist(scene)
     collection = bpy.data.collections.new(COLLECTION)
     collection.hide_render = True
     scene.collection.children.link(collection)
     images = [(k, "white") for k in range(len(hemicube))]
-    # where they can be seen: what captures by far ones has the same directions
+    # drawn near, where they can be seen; far patches of a capture have the same directions
     drawn = replace(hemicube, size=min(hemicube.size, VISIBLE * radius))
     build(collection, drawn, pattern_set("white"), images, lambda block: block)
     collection["arto_hemicube"] = json.dumps(hemicube.to_json())
@@ -280,7 +288,7 @@ def built(scene: bpy.types.Scene) -> tuple[Hemicube, float] | None:
 
 
 def remove_for_artist(scene: bpy.types.Scene) -> bool:
-    """Remove the artist's hemicube, with all that belongs to it; whether there was one."""
+    """Remove the artist's hemicube and its data -> whether there was a hemicube."""
     collection = of_artist(scene)
     if collection is None:
         return False

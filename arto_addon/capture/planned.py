@@ -1,5 +1,7 @@
-"""What is decided before the first long render: patches, their route, tiles, and whether there is
-room for it."""
+"""What is decided before the first long render: patches, their route, tiles, and keeping images.
+
+The plan also checks that there is room for the capture.
+"""
 
 from __future__ import annotations
 
@@ -27,14 +29,16 @@ from .plan import render_plan, strips_of, tiles_of
 from .probe import refined
 from .room import Estimate
 
-# How many times as many patches as the grid has the probe may hand out.
+# How many times more patches than the grid has the probe may ask for.
 ADAPTIVE_SHARE = 2
 
 
 @dataclass(frozen=True)
 class Given:
-    """What was looked at before, for all frames of a shot: the patches, whole, and how light gets
-    to them; caution: see `check_light`."""
+    """What was decided before, for all frames or takes of a shot.
+
+    hemicube: all its patches, refined; route: how light gets to them; caution: see `check_light`.
+    """
 
     hemicube: Hemicube
     route: Route
@@ -65,9 +69,11 @@ def planned(
     strips: int | None = None,
     takes: int = 1,
 ) -> Steps:
-    """Look at the scene, by small renders -> `Planned`. strips: into how many tiles the picture is
-    cut (default: as the memory says); takes: so many captures like this are to come. Raises
-    SceneError where there is no room for them."""
+    """Look at the scene by small renders and plan a capture -> `Planned`.
+
+    strips: the number of tiles of the picture (default: as many as memory makes necessary); takes:
+    how many captures like this are to come. Raises SceneError where there is no room for them.
+    """
     settings = scene.arto
     if given:
         route, caution = given.route, given.caution
@@ -107,18 +113,20 @@ def planned(
 
 
 def light_route(on: Stage, hemicube: Hemicube) -> Steps:
-    """How light gets to the patches -> (route, what the artist is told, see `check_light`)."""
+    """Choose how light gets to the patches -> (route, the `Caution` of `check_light` or None)."""
     settings = on.scene.arto
     if not settings.far:
-        # a near hemicube is no world: what it lights differs by what it is near to
+        # a near hemicube lights near things more, so a comparison with a world says nothing
         return Route(settings.route), None
     sampled, caution = yield from check_light(on, hemicube)
     return (Route.SAMPLED if sampled else Route(settings.route)), caution
 
 
 def most(scene: bpy.types.Scene) -> Estimate:
-    """What a capture may take at most, before anything is looked at. Raises SceneError,
-    HemicubeError, PatternError."""
+    """What a capture may take at most, without a look at the scene.
+
+    Raises SceneError, HemicubeError, PatternError.
+    """
     settings = scene.arto
     hemicube = planes.wanted(scene, (0.0, 0.0, 0.0), 1.0)
     patches = len(hemicube) * (ADAPTIVE_SHARE if settings.adaptive else 1)
@@ -130,10 +138,10 @@ def most(scene: bpy.types.Scene) -> Estimate:
 
 
 def guess(scene: bpy.types.Scene, short: bool = False) -> str:
-    """`most` in words, for the button; short: of memory and disk alone, for a panel.
+    """Say `most` in words, for the button; short: memory and disk alone, for a panel.
 
-    What it will take, the capture says after its probe. Where it cannot be, why not: a panel raises
-    nothing.
+    Where a capture cannot be made, say why instead of raising. Once a capture has made its probe,
+    it says what it will really take.
     """
     try:
         found = most(scene)

@@ -21,7 +21,7 @@ SAMPLES = 32
 
 
 def refined(on: Stage, hemicube: Hemicube, most: int) -> Steps:
-    """Render a probe of the prepared stage and refine the hemicube by it -> Hemicube.
+    """Render a probe of the prepared stage and refine the hemicube with it -> Hemicube.
 
     Raises CancelledError, CaptureSetError, ExrError, HemicubeError; the stage is left as it was.
     """
@@ -30,8 +30,10 @@ def refined(on: Stage, hemicube: Hemicube, most: int) -> Steps:
 
 
 def probed(on: Stage, hemicube: Hemicube) -> Steps:
-    """Render a probe of the prepared stage -> (F * 16 * 16, h, w, 3), see `refine`. Raises as
-    `refined` does."""
+    """Render a probe of the prepared stage -> (F * 16 * 16, h, w, 3), for `refine`.
+
+    Raises what `refined` raises.
+    """
     check(hemicube)
     fine = replace(hemicube, patches=FINEST)
     patterns = pattern_set("white")

@@ -1,4 +1,4 @@
-"""Going on with a capture that was stopped, and putting a finished one in its place."""
+"""Go on with a capture that was stopped, and put a finished capture in its place."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from .stream import Stream
 
 
 def unfinished(folder: Path, key: str) -> CaptureHead | None:
-    """The head of the very same capture, left unfinished, to go on with."""
+    """The head of an unfinished capture with the same key; None where there is none."""
     if (folder / HEADER).is_file():
         with contextlib.suppress(ArtoError):
             there = CaptureSet(folder, unfinished=True).head
             if there.key == key:
-                # what a process that was killed was writing
+                # remove the file that a killed process was writing
                 for partial in folder.glob("*" + PART):
                     marked.remove_file(partial, "capture")
                 return there
@@ -40,8 +40,10 @@ def empty(folder: Path) -> None:
 
 
 def empty_take(folder: Path) -> None:
-    """Remove what ARTO has made in the folder of a take, and the folder where nothing else is in
-    it. Raises CaptureSetError."""
+    """Remove ARTO's files from a take's folder, and the folder itself if it is then empty.
+
+    Raises CaptureSetError.
+    """
     if not marked.is_folder(folder):
         return
     with _removing(folder):
@@ -62,7 +64,7 @@ def _removing(folder: Path) -> Iterator[None]:
 
 
 def finish(unfinished: Path, folder: Path) -> None:
-    """Put the complete capture set where the last one is."""
+    """Replace the last capture set by the complete new set."""
     try:
         replace_folder(unfinished, folder)
     except OSError as e:
@@ -73,7 +75,7 @@ def finish(unfinished: Path, folder: Path) -> None:
 
 
 def let_go(folder: Path, head: CaptureHead, number: int, fitted: dict[str, Any]) -> CaptureHead:
-    """Note down that a tile was fitted, then remove its basis images -> the head after it."""
+    """Note down that a tile was fitted, then remove its basis images -> the new head."""
     files = head.tiles[number].files
     head = head.with_tile(number, files=(), seeds=(), fitted=fitted)
     heads.write(folder, head)
@@ -83,10 +85,10 @@ def let_go(folder: Path, head: CaptureHead, number: int, fitted: dict[str, Any])
 
 
 def finish_field(unfinished: Path, folder: Path, head: CaptureHead) -> None:
-    """Put the field of a capture that was fitted as it came where the last one is."""
+    """Replace the last field by that of a capture whose tiles were fitted as they came."""
     partial = unfinished / Stream.FIELD
     if not partial.exists():
-        # a process that was killed has put it there already
+        # a process that was killed afterwards may have put the field in place already
         if Field(folder).about.key == head.key:
             return
         raise FieldError(

@@ -1,4 +1,4 @@
-"""Room: the memory that a capture may take, the disk that it needs, and how long it will be."""
+"""Room: how much memory a capture may take, how much disk it needs, and how long it takes."""
 
 from __future__ import annotations
 
@@ -13,28 +13,29 @@ from ...core.errors import SceneError
 from ...core.region import Region
 from ...core.units import clock, size
 
-# Of the machine's memory, what the chain may take where the artist does not say: Blender, the scene
-# and the rest of the machine have the others.
+# The share of the machine's memory that capture and fit may take by default. The rest is for
+# Blender, the scene and other programs.
 SHARE = 1 / 6
-# and at most this of what is free: the scene itself takes some of it, twice.
+# They may also take at most this share of the free memory: the scene needs memory too, twice.
 FREE_SHARE = 1 / 2
 LEAST_MEGABYTES = 512
-# Bytes of a pixel, as measured (`python -m bench speed`): of a layer on disk; of each light group
-# in Cycles' and in Blender's buffers; of a patch while it is fitted; of what was fitted, its
-# proxies and what writing it takes; of the layers that are no groups.
+# Measured bytes for a pixel (`python -m bench speed`): for a layer on disk; for a light group in
+# the buffers of Cycles and Blender; for a patch while fitting; for a fitted tile, its proxies and
+# writing them. The last number is how many layers a render has besides light groups.
 ON_DISK = 12
 PER_PASS = 44
 PER_PATCH = 10
 FITTED = 4500
 OTHER_PASSES = 9
-# Of a field on disk, with its layers and proxies: of a pixel, and of each patch in it, about.
+# About the bytes of a field on disk, with layers and proxies: for a pixel, and for each of its
+# patches.
 FIELD, FIELD_PATCH = 74, 2.0
-# Of what is needed, how much more must be free.
+# How much more disk must be free than is needed, as a share of the need.
 SPARE = 0.05
 
 
 def memory() -> tuple[int, int | None]:
-    """Bytes of memory that the machine has, and that are free; None where it does not say."""
+    """The machine's memory and its free memory, in bytes; None where free memory is not known."""
     if sys.platform == "win32":
         import ctypes
 
@@ -50,7 +51,7 @@ def memory() -> tuple[int, int | None]:
         return int(status.total), int(status.free)
     total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     try:
-        # what Linux could give without swapping; other systems have no such file
+        # memory that Linux can give without swapping; other systems have no such file
         said = Path("/proc/meminfo").read_text(encoding="ascii")
         return total, int(said.split("MemAvailable:")[1].split()[0]) << 10
     except (OSError, IndexError, ValueError):
@@ -58,7 +59,7 @@ def memory() -> tuple[int, int | None]:
 
 
 def budget(megabytes: int) -> int:
-    """Bytes that capture and fit may take; megabytes: what the artist says, 0 for a share."""
+    """Memory that capture and fit may take, in bytes. megabytes: the artist's limit, 0 for none."""
     if megabytes:
         return megabytes << 20
     total, free = memory()
@@ -67,16 +68,21 @@ def budget(megabytes: int) -> int:
 
 
 def bytes_a_pixel(passes: int, patches: int, fitted: bool) -> int:
-    """Memory that a pixel of a tile takes while the tile is rendered and, where captures are fitted
-    as they come, the last one is fitted."""
+    """Memory that a pixel of a tile takes, in bytes, while the tile is rendered.
+
+    fitted: whether tiles are fitted as they come; the tile before is then fitted at the same time.
+    """
     fit = patches * PER_PATCH + FITTED if fitted else 0
     return (passes + OTHER_PASSES) * PER_PASS + fit
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a capture will take. seconds: None where nothing was rendered yet to tell by; memory,
-    disk (while it runs), kept (after it): bytes."""
+    """What a capture will take.
+
+    seconds: None before anything was rendered; memory: bytes; disk: bytes while the capture runs;
+    kept: bytes after the capture.
+    """
 
     seconds: float | None
     memory: int
@@ -88,14 +94,14 @@ class Estimate:
         return asdict(self)
 
     def times(self, takes: int) -> Estimate:
-        """Of a shot of which there are so many takes, one after the other."""
+        """The estimate for so many takes of the shot, captured one after the other."""
         seconds = None if self.seconds is None else takes * self.seconds
         disk, kept = self.disk + (takes - 1) * self.kept, takes * self.kept
         return Estimate(seconds, self.memory, disk, kept, takes * self.renders)
 
     @property
     def line(self) -> str:
-        """In words."""
+        """The estimate in words."""
         time = f"about {clock(self.seconds)}, " if self.seconds is not None else ""
         return (
             f"{time}{size(self.disk)} of disk while it runs, keeps {size(self.kept)}, "
@@ -110,8 +116,11 @@ def estimate(
     fitted: bool,
     seconds: float | None = None,
 ) -> Estimate:
-    """plan: how many images each render of a tile has; fitted: whether tiles are fitted as they
-    come, and their images go."""
+    """Estimate a capture's memory and disk.
+
+    plan: how many images each render of a tile has; fitted: whether tiles are fitted as they come
+    and their images removed; seconds: how long the capture takes, where known.
+    """
     layers = sum(n + OTHER_PASSES for n in plan)
     largest = max(t.pixels for t in tiles)
     everything = sum(t.pixels for t in tiles)

@@ -1,8 +1,8 @@
 """An animated shot: a field for each frame, in the light of the same patches (paper 9).
 
 The patches are those that the first, the middle and the last frame need together, around all that
-the three of them show: what two frames differ by is then what moved, and not how it was looked at.
-The noise of each frame is that of the artist's own render, whose rule for seeds is kept.
+these three frames show. With the same patches for all frames, two frames differ only by what moved.
+The seeds follow the artist's own rule, so the noise changes or stays as in the artist's render.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from .planned import ADAPTIVE_SHARE, Given, light_route
 
 @contextmanager
 def frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
-    """Put the scene back to its frame at the end."""
+    """Put the scene back to its present frame at the end."""
     frame, part = scene.frame_current, scene.frame_subframe
     try:
         yield
@@ -43,9 +43,8 @@ def frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
 def capture_frames(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> Steps:
     """Capture some frames of a shot, each with its field; returns their folders.
 
-    Frames that are there already, captured in the same way, are captured again: `capture` tells
-    them from what was stopped. Raises what `capture` raises, SceneError for no frames; the scene is
-    put back to the frame that it had.
+    Finished frames are captured again; a frame that was stopped goes on (`capture`). The scene is
+    put back to its frame. Raises what `capture` raises, and SceneError without frames.
     """
     if not frames:
         raise SceneError("there are no frames to capture: give a first and a last one")
@@ -62,7 +61,7 @@ def capture_frames(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int
 
 
 def together(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> Steps:
-    """The patches of all frames -> `Given`."""
+    """Find the patches for all frames -> `Given`."""
     some = sorted({frames[0], frames[len(frames) // 2], frames[-1]})
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for frame in some:

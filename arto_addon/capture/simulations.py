@@ -1,7 +1,7 @@
-"""Simulations that were played and not baked: only the open scene has them as they are.
+"""Simulations that were played but not baked: only the open scene has their state.
 
-A copy of the scene, and another Blender, simulates anew when it comes to a frame, and things are
-then elsewhere. A baked cache goes along.
+A copy of the scene, or another Blender, simulates anew at a frame and may put things elsewhere. A
+baked cache is used by both.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import bpy
 
 
 def unbaked(scene: bpy.types.Scene, view_layer: str) -> str:
-    """The first simulation that a capture would show elsewhere, in words; empty for none."""
+    """The first simulation that a capture would show in another state, in words; empty for none."""
     for words, cache in _caches(scene, view_layer):
         baked = cache.is_baked or cache.use_external
         if not baked and scene.frame_current > cache.frame_start:
@@ -22,7 +22,7 @@ def unbaked(scene: bpy.types.Scene, view_layer: str) -> str:
 
 
 def _caches(scene: bpy.types.Scene, view_layer: str) -> Iterator[tuple[str, Any]]:
-    """What is simulated of what is rendered, and the cache of each."""
+    """Each simulation of what is rendered: its name and its cache."""
     bodies = scene.rigidbody_world
     if bodies and bodies.enabled and bodies.collection:
         moved = [

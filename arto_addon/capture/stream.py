@@ -1,7 +1,7 @@
-"""The stream: each tile is fitted while Cycles renders the next, and its basis images go.
+"""The stream: fit each tile while Cycles renders the next, then remove its basis images.
 
-The fit is numpy's and Cycles lets go of Python's lock, so a thread does it. What the thread meets
-is raised where the capture next looks at it.
+A thread does the fit, which works because Cycles releases Python's lock while it renders. An error
+in the thread is raised where the capture next looks at the thread.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Stream:
         self.share = 0.0
 
     def start(self, number: int) -> None:
-        """Begin with a tile, which the set's description says to be there."""
+        """Begin to fit a tile, which must be rendered by what the set's head says."""
         captured = CaptureSet(self.folder, unfinished=True)
         self._number, self.share, self._entry, self._error = number, 0.0, None, None
 
@@ -54,8 +54,11 @@ class Stream:
         return driven(fit_into(captured, number, self.folder / self.FIELD), look)
 
     def ended(self, patience: float | None) -> tuple[int, dict[str, Any]] | None:
-        """The tile that was fitted, and its entry in `field.json`; None where none is, or not
-        within so many seconds. Raises what the fit met."""
+        """The number of the tile that was fitted, and its entry in `field.json`.
+
+        None where no tile is being fitted, or the fit takes longer than `patience` seconds. Raises
+        the error of the fit.
+        """
         if self._thread is None:
             return None
         self._thread.join(patience)
@@ -72,7 +75,7 @@ class Stream:
         return self._thread is not None
 
     def stop(self) -> None:
-        """End at the next patch; what was not written is fitted anew by who goes on."""
+        """End the fit at the next patch. A capture that goes on fits the tile anew."""
         self._stop.set()
         with contextlib.suppress(BaseException):
             self.ended(None)
