@@ -35,7 +35,7 @@ _CLASSES = (
     *groups.CLASSES,
     *panels.CLASSES,
 )
-# In this order; the other way round to unregister.
+# Registered in this order, unregistered in the reverse order.
 _MODULES = (
     properties,
     switches,

@@ -17,14 +17,14 @@ from .work import Progress, Steps, part_of
 from .world.check import world_of
 from .world.own import sync
 
-# Of the whole work, what the capture is, and what fitting is where it was not done meanwhile.
+# The shares of the whole work that are done after the capture, and after the fit.
 CAPTURED, FITTED = 0.9, 0.95
 
 
 def shoot(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
-    """Capture, fit and relight; returns (the path of the plate, None where there is no world).
+    """Capture, fit and relight; returns a tuple: the path of the plate, None without a world.
 
-    Raises what the three raise: what is done by then stays. Nothing of the scene changes.
+    The scene does not change. Raises what the three steps raise; finished steps are kept.
     """
     layer = view_layer or layer_of(scene)
     yield from part_of(capture(scene, layer), 0.0, CAPTURED)
@@ -37,7 +37,7 @@ def shoot(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
 
 
 def shoot_and_show(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
-    """`shoot`, here: the plate comes into the scene's compositor, and its lamps into the panel."""
+    """Shoot, then put the plate into the compositor and the lamps' groups into the panel."""
     layer = view_layer or layer_of(scene)
     (path,) = yield from shoot(scene, layer)
     sync(scene, Field(paths.field_folder(scene, layer)))

@@ -1,8 +1,8 @@
 """Long work as a generator of steps, and what drives it.
 
-A piece of work yields `Progress` and `Render`. The steps run one after the other, and a render
-blocks: in batch, and in the second Blender that a button starts. Cleaning up is the generator's own
-`finally`, so there is one way out however it ends.
+A piece of work yields `Progress` and `Render`. The driver does the steps one after the other and
+waits for each render, both in batch and in the second Blender that a button starts. The generator
+cleans up in its own `finally`, however the work ends.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ class Render:
     scene: str
     share: float
     text: str
-    span: float = 0.0  # how much of the whole work it is
+    span: float = 0.0  # the render's share of the whole work
     state: str = field(default="waiting")  # then "done" or "cancelled"
 
     def check(self) -> None:
-        """Raise CancelledError unless the render came to its end."""
+        """Raise CancelledError unless the render was completed."""
         if self.state != "done":
             raise CancelledError(STOPPED)
 
@@ -51,13 +51,13 @@ Steps = Generator[Progress | Render, None, Any]
 
 
 def _last_properties() -> Any:
-    # asked for each time: Blender replaces them by others
+    # looked up at each call: Blender replaces the object
     return bpy.context.window_manager.operator_properties_last("render.render")
 
 
 @contextmanager
 def last_properties_kept() -> Iterator[None]:
-    """Blender gives the next F12 what the last render was called with: it gets back what it had."""
+    """Put back the properties of the last render, which Blender uses again for the next F12."""
     last = _last_properties()
     names = [p.identifier for p in last.bl_rna.properties if not p.is_readonly] if last else []
     before = {n: getattr(last, n) for n in names if last.is_property_set(n)}
@@ -73,7 +73,7 @@ def last_properties_kept() -> Iterator[None]:
 
 
 def blocking_render(request: Render) -> None:
-    """Render here and now."""
+    """Do a render and wait for it."""
     ended: list[str] = []
 
     def on_cancel(*_: object) -> None:
@@ -95,8 +95,10 @@ def blocking_render(request: Render) -> None:
 def retold(
     steps: Generator[_Step, None, _Made], change: Callable[[_Step], _Other | None]
 ) -> Generator[_Other, None, _Made]:
-    """The steps of a piece of work as `change` tells them; a step that it makes None of is left
-    out. Returns what the work returns, and closes the work however it ends."""
+    """Pass on the steps of a piece of work as `change` returns them; None leaves a step out.
+
+    Returns what the work returns, and closes the work however it ends.
+    """
     try:
         while True:
             if (other := change(next(steps))) is not None:
@@ -119,9 +121,9 @@ def driven(steps: Generator[_Step, None, _Made], do: Callable[[_Step], None]) ->
 
 
 def part_of(steps: Steps, begin: float, span: float, title: str = "") -> Steps:
-    """The steps of a piece of work that is a part of a larger one: from `begin`, over `span`.
+    """Pass on the steps of a part of a larger work: their shares run from `begin` over `span`.
 
-    title: what is put before the text of each step.
+    title: put before the text of each step.
     """
 
     def change(step: Progress | Render) -> Progress | Render:
@@ -134,7 +136,10 @@ def part_of(steps: Steps, begin: float, span: float, title: str = "") -> Steps:
 
 
 def run(steps: Steps, say: Callable[[Progress | Render], None] | None = None) -> Any:
-    """Drive the work to its end, blocking; returns what it returns."""
+    """Drive the work to its end, renders included; returns what the work returns.
+
+    say: called with each step.
+    """
 
     def do(step: Progress | Render) -> None:
         if say:
@@ -149,7 +154,7 @@ def run(steps: Steps, say: Callable[[Progress | Render], None] | None = None) ->
 
 
 class ProgressLines:
-    """Prints progress for batch runs: every new thing being done, and each tenth of it."""
+    """Prints progress for batch runs: a line for each new text, and for each tenth of the work."""
 
     def __init__(self, name: str) -> None:
         self.name = name

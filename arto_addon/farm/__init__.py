@@ -1,5 +1,4 @@
-"""A capture by many machines: a plan, parts that any of them renders, and what joins them.
+"""A capture by many machines: plan a job, render its parts on any machine, gather the parts.
 
-Farms run Blender, and an engine of theirs hands out the parts; nothing here waits for another
-machine.
+The farm's own engine hands out the parts and runs Blender. Nothing here waits for another machine.
 """

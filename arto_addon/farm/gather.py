@@ -1,4 +1,4 @@
-"""Gathering a farm's job: every part is there and of one scene, and becomes a field."""
+"""Gather a farm's job: check that all parts are there and of one scene, and fit them."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ from .job import Job
 
 
 def gather(job_folder: Path) -> Steps:
-    """Join the parts of a job: the field of each frame takes the place of its shot's, and so do
-    those of its takes; returns the folders of the frames' fields.
+    """Join the parts of a job; returns the folders of the frames' fields.
 
-    Seeds are averaged by their samples, light by light. Raises FarmError, naming what is missing;
-    then nothing has changed.
+    The fields of each frame and of its takes replace those of the shot. Images of several seeds are
+    averaged, weighted by their samples. Raises FarmError, which names what is missing, before
+    anything is changed.
     """
     job = Job(job_folder)
     sets = {
@@ -70,7 +70,7 @@ def gather(job_folder: Path) -> Steps:
                         p: t for p, t in found.items() if t and (p.frame, p.take) == (frame, take)
                     }
                     yield from _joined(job, frame, take, parts)
-                # as `capture` ends: all together, the first take last
+                # put all takes in place at the end, the first take last, as `capture` does
                 for take in reversed(left):
                     yield from _placed(scene, job.set_folder(frame, take), claimed / take)
                 if left and frame not in job.catchers:
@@ -87,7 +87,7 @@ def gather(job_folder: Path) -> Steps:
 
 
 def _gathered(job: Job, frame: int, take: Take) -> bool:
-    """Whether the capture set of a take of a frame has gone to its shot."""
+    """Whether the capture set of a take of a frame was already moved to the shot."""
     return not job.set_folder(frame, take).is_dir()
 
 
@@ -97,10 +97,10 @@ class Found:
 
     Parameters
     ----------
-    folder : that its files are in; None where its capture set has them already.
+    folder : where the part's files are; None where its capture set has them already.
     files : the names of its EXR files.
     samples : of each pixel.
-    fitted : where it was fitted and its images went, its entry in `field.json`.
+    fitted : the entry in `field.json`, if the part was fitted and its images removed.
     """
 
     folder: Path | None
@@ -110,8 +110,10 @@ class Found:
 
 
 def _found(job: Job, part: Part, captured: CaptureSet) -> Found | None:
-    """What a part says of itself, or the files that a Blender without ARTO has rendered. None where
-    not all of it is there."""
+    """Find what was rendered of a part, with ARTO or by a Blender without ARTO.
+
+    None where a file is missing.
+    """
     if captured.head.tiles[part.tile].done:
         return Found(None)
     if told := job.there(part, captured.head.key):
@@ -130,8 +132,7 @@ def _found(job: Job, part: Part, captured: CaptureSet) -> Found | None:
 
 
 def _joined(job: Job, frame: int, take: Take, parts: dict[Part, Found]) -> Steps:
-    """Take the parts of a take of a frame into its capture set, tile by tile, and fit what is not
-    yet."""
+    """Move the parts of a take into its capture set, tile by tile, and fit unfitted tiles."""
     folder = job.set_folder(frame, take)
     head = job.set_of(frame, take).head
     samples = job.head.seeds * job.samples_of(head)
@@ -153,8 +154,10 @@ def _joined(job: Job, frame: int, take: Take, parts: dict[Part, Found]) -> Steps
 def _taken(
     folder: Path, head: CaptureHead, tile: int, some: list[tuple[Part, Found]]
 ) -> CaptureHead:
-    """Move what a tile's parts have into its capture set -> the head of the set, which is not
-    written yet."""
+    """Move the files of a tile's parts into its capture set -> the set's new head.
+
+    The head is not written yet.
+    """
     seeds, fitted = [], None
     for part, told in some:
         names = []
@@ -162,7 +165,7 @@ def _taken(
             raise FarmError(f"{part.name} was gathered, but {folder} does not say so: plan again")
         for i, name in enumerate(told.files):
             names.append(f"tile_{part.tile:04d}_seed_{part.seed:02d}_{i:04d}.exr")
-            if (told.folder / name).exists():  # else it was moved before a gathering was stopped
+            if (told.folder / name).exists():  # otherwise an earlier gathering moved it
                 (told.folder / name).replace(folder / names[-1])
         seeds.append(SeedEntry(told.samples, tuple(names)))
         if told.fitted:
@@ -179,7 +182,7 @@ def _taken(
 
 
 def _take_field(source: Path, field: Path, name: str) -> None:
-    """Move a fitted tile, and its proxies, from a part's folder to the field's."""
+    """Move a fitted tile and its proxies from a part's folder to the field's folder."""
     for here, there in [
         (source, field),
         *((proxy_folder(source, f), proxy_folder(field, f)) for f in FACTORS),
@@ -193,7 +196,7 @@ def _take_field(source: Path, field: Path, name: str) -> None:
 
 
 def _fit(captured: CaptureSet, tile: int, tiles: int) -> Steps:
-    """Fit a tile of a set into `field` in its folder -> its entry in `field.json`."""
+    """Fit a tile of a set into `field` in the set's folder -> the tile's entry in `field.json`."""
     steps = fit_into(captured, tile, captured.folder / Stream.FIELD)
     return retold(
         steps, lambda share: Progress((tile + share) / tiles, f"fitting tile {tile + 1} of {tiles}")
@@ -201,20 +204,20 @@ def _fit(captured: CaptureSet, tile: int, tiles: int) -> Steps:
 
 
 def _placed(scene: bpy.types.Scene, folder: Path, place: Path) -> Steps:
-    """Put a complete capture set, and its field, where the shot's last ones are."""
+    """Replace the shot's last capture set and field by the complete new set and its field."""
     try:
         place.mkdir(exist_ok=True)
         near = folder
         if folder.stat().st_dev != place.stat().st_dev:
-            # folders are put in each other's place on one disk alone; the job's go last, so that
-            # who was killed does it again
+            # a folder can replace another only on one disk, so copy the set first; the job's own
+            # set is removed last, so that a killed gathering can be done again
             near = marked.scratch(place / folder.name, "capture")
             yield Progress(0.99, f"copying {folder.name} to {place}")
             shutil.copytree(folder, near, dirs_exist_ok=True)
     except OSError as e:
         raise FarmError(f"{place} cannot be written ({e}): make room, and gather again") from e
     head = CaptureSet(near).head
-    # planned from a file that no capture has given an ID, it has none, and no name lasts
+    # a job planned before the scene had an ID has none, and names may change: add the ID now
     if head.shot:
         head = replace(head, shot=replace(head.shot, scene_id=scene_id.of(scene)))
     heads.write(near, head)

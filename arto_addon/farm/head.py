@@ -1,6 +1,6 @@
-"""What a farm's files say, checked: `job.json` of a job, and `part.json` of a rendered part.
+"""The heads of a farm's files, checked: `job.json` of a job, and `part.json` of a rendered part.
 
-Each is read by `read` and written by `write` alone.
+Only the functions here read and write these files.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from ...core.values import Values
 from ..stage.takes import TAKES
 
 FORMAT = "ARTO farm job"
-# Version 1 knows no takes beside the first, and so has none.
+# Version 1 has only the first take of each frame.
 VERSION = 2
 READABLE = (1, VERSION)
 HEADER = "job.json"
 PART_HEADER = "part.json"
-# Frames, tiles, seeds or parts of a job.
+# The most frames, tiles, seeds or parts that a job may have.
 MOST = 1_000_000
 
 
@@ -36,10 +36,10 @@ class Part:
 
     Parameters
     ----------
-    number : in the job.
-    frame, tile : which tile of the frame's capture set.
+    number : the part's number in the job.
+    frame, tile : a tile of the frame's capture set.
     seed : 0 for the first of the job's seeds, and so on.
-    take : of which take of the frame.
+    take : a take of the frame.
     """
 
     number: int
@@ -54,7 +54,7 @@ class Part:
 
     @staticmethod
     def read(said: Values) -> Part:
-        """From a part of a `part.json`. Raises FarmError."""
+        """Read a part from the values of a `part.json`. Raises FarmError."""
         return Part(
             number=said.whole("number", 0, MOST),
             frame=said.whole("frame", -LARGEST_FRAME, LARGEST_FRAME),
@@ -77,15 +77,15 @@ class JobHead:
     Parameters
     ----------
     blend : the name of the file that was planned.
-    blender : the version that planned.
-    scene, view_layer : which of the file.
-    settings : ARTO's settings, by their names.
-    frames : their numbers.
-    subframe : of all frames.
-    catchers : those of the frames that show shadow catchers.
-    tiles : of each frame.
-    seeds : of each tile.
-    others : what the file says beside that.
+    blender : the version of Blender that planned the job.
+    scene, view_layer : their names in the file.
+    settings : ARTO's settings, by name.
+    frames : the numbers of the frames.
+    subframe : the same for all frames.
+    catchers : the frames that show shadow catchers.
+    tiles : how many for each frame.
+    seeds : how many for each tile.
+    others : all other entries of the file, kept as they are.
     """
 
     blend: str
@@ -102,7 +102,7 @@ class JobHead:
 
     @staticmethod
     def read(said: Values) -> JobHead:
-        """From a `job.json`. Raises FarmError."""
+        """Read a job from the values of a `job.json`. Raises FarmError."""
         if said.data.get("version") not in READABLE:
             raise said.wrong("version", said.data.get("version"))
         frames = _frames(said, "frames")
@@ -156,12 +156,12 @@ class JobHead:
         return takes * self.tiles * self.seeds
 
 
-# What `to_json` writes that is no value of its own.
+# Entries that `to_json` writes and that are no fields of `JobHead`.
 _WRITTEN = ("format", "version", "parts")
 
 
 def _frames(said: Values, name: str) -> tuple[int, ...]:
-    """A list of frames; empty where there is none."""
+    """A list of frames; empty where the entry is missing."""
     found = said.kind(name, list, [])
     if len(found) > MOST or any(
         type(frame) is not int or abs(frame) > LARGEST_FRAME for frame in found
@@ -176,12 +176,12 @@ class PartHead:
 
     Parameters
     ----------
-    part : of its job.
-    key : of the capture that it is a part of.
-    samples : of each pixel.
-    files : the names of its EXR files, in its folder.
-    seconds : that it took.
-    fitted : where it was fitted and its images went, its entry in `field.json`.
+    part : which part of its job.
+    key : the key of the capture that the part belongs to.
+    samples : the number of samples of each pixel.
+    files : the names of the part's EXR files, in its folder.
+    seconds : how long the part took.
+    fitted : the entry in `field.json`, if the part was fitted and its images removed.
     """
 
     part: Part
@@ -197,7 +197,7 @@ class PartHead:
         files = said.kind("files", list, [])
         part = Part.read(said.inside(said.kind("part", dict, {}), "part", "part."))
         fitted = said.kind("fitted", dict)
-        # what it names is moved into the frame's field, in place of what has that name there
+        # The named file later replaces a file of the frame's field: accept only names of this tile.
         if fitted is not None and fitted_name(fitted) not in tile_names(part.tile):
             raise said.wrong("fitted", fitted_name(fitted))
         return PartHead(
@@ -235,7 +235,7 @@ def read(folder: Path) -> JobHead:
 
 
 def is_job(path: Path) -> bool:
-    """Whether a file says that it is the description of a farm's job, of whatever version."""
+    """Whether a file is the head of a farm's job, of any version."""
     try:
         return Values(path, FarmError).data.get("format") == FORMAT
     except FarmError:
@@ -251,7 +251,7 @@ def write(folder: Path, head: JobHead) -> None:
 
 
 def read_part(folder: Path) -> PartHead | None:
-    """What the part in a folder says of itself; None where it is not there. Raises FarmError."""
+    """Read the head of the part in a folder; None where it is not there. Raises FarmError."""
     path = folder / PART_HEADER
     if not path.is_file():
         return None

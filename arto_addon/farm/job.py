@@ -1,8 +1,8 @@
-"""A farm's job: a folder that says what is to be rendered, and takes what was.
+"""A farm's job: a folder that says what to render, and takes what was rendered.
 
-`job.json` says what; `frame_<n>/` is the capture set of each frame, with no tile rendered yet, and
-beside it those of its other takes, where there are shadow catchers; a part is `parts/part_<i>/`,
-there whole or not at all.
+`job.json` says what to render. `frame_<n>/` is the capture set of a frame, with no tile rendered
+yet. With shadow catchers, the sets of the frame's other takes are beside it. `parts/part_<i>/` is a
+rendered part, which is either there as a whole or not there.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Job:
         self.catchers = frozenset(self.head.catchers)
 
     def takes(self, frame: int) -> tuple[Take, ...]:
-        """The names of a frame's takes, that of everything first."""
+        """The names of a frame's takes. The take of everything comes first."""
         return (WHOLE, *TAKES) if frame in self.catchers else (WHOLE,)
 
     @property
@@ -54,7 +54,7 @@ class Job:
         return [Part(i, *each) for i, each in enumerate(every)]
 
     def part(self, number: int) -> Part:
-        """Raises FarmError for a number that is no part's."""
+        """The part with this number. Raises FarmError where there is none."""
         parts = self.parts
         if not 0 <= number < len(parts):
             raise FarmError(f"there is no part {number}: {self.folder} has 0 to {len(parts) - 1}")
@@ -74,24 +74,28 @@ class Job:
         return found
 
     def samples_of(self, head: CaptureHead) -> int:
-        """How many samples a part has. Once a tile is gathered, its set's head says those of all
-        seeds. Raises FarmError."""
+        """The number of samples of a part, from the head of its set. Raises FarmError.
+
+        The head of a gathered set has the samples of all seeds together.
+        """
         if not head.samples:
             raise FarmError(f"{self.folder} has a capture set without samples: plan again")
         return int(head.samples) // (self.head.seeds if head.done else 1)
 
     def go_to(self, scene: bpy.types.Scene, frame: int) -> None:
-        """Bring the scene to a frame as it was planned."""
+        """Bring the scene to a frame, at the subframe that was planned."""
         scene.frame_set(frame, subframe=self.head.subframe)
-        # whatever a script has moved is where it should be
+        # let the scene follow what a script has moved
         scene.view_layers[self.head.view_layer].update()
 
     def part_folder(self, part: Part) -> Path:
         return self.folder / "parts" / part.name
 
     def there(self, part: Part, key: str | None) -> PartHead | None:
-        """What a rendered part says of itself; None where it is not there. Raises FarmError for one
-        of another job or scene."""
+        """The head of a rendered part; None where the part is not there.
+
+        Raises FarmError where the part is of another job or scene.
+        """
         folder = self.part_folder(part)
         said = heads.read_part(folder)
         if said is not None and (said.key != key or said.part != part):
@@ -103,8 +107,11 @@ class Job:
 
     @contextmanager
     def scene(self) -> Iterator[tuple[bpy.types.Scene, str]]:
-        """The job's scene and view layer in this file, with the job's settings and, at the end,
-        with its own again, and at its frame. Raises FarmError where the file is another one."""
+        """Give the scene and view layer of the job in this file the job's settings for a while.
+
+        At the end the scene has its own settings and its frame again. Raises FarmError where the
+        job was planned from another file.
+        """
         scene = bpy.data.scenes.get(self.head.scene)
         layer = self.head.view_layer
         if scene is None or layer not in scene.view_layers:
@@ -122,7 +129,7 @@ class Job:
 
 
 def set_folder(folder: Path, frame: int, take: Take) -> Path:
-    """Where in a job's folder the capture set of a take of a frame is."""
+    """The folder of the capture set of a take of a frame, in a job's folder."""
     return folder / (f"frame_{frame:04d}" + (f"_{take}" if take else ""))
 
 
@@ -137,14 +144,14 @@ def _set(scene: bpy.types.Scene, settings: Mapping[str, Any]) -> None:
 
 
 def estimate(head: CaptureHead, fitted: bool) -> Estimate:
-    """What a take of a frame needs, all its tiles under one seed; fitted: see `room.estimate`."""
+    """Estimate a take of a frame: all its tiles, with one seed. fitted: see `room.estimate`."""
     tiles = [tile.region for tile in head.tiles]
     images = [len(some) for some in plan_of(head)]
     return room.estimate(images, tiles, len(head.hemicube), fitted)
 
 
 def settings_of(scene: bpy.types.Scene) -> dict[str, Any]:
-    """ARTO's settings of a scene that go to a farm."""
+    """The settings of a scene that a farm's job carries."""
     found = {}
     for name in FARM:
         value = getattr(scene.arto, name)
@@ -164,8 +171,11 @@ def write(
     tiles: int,
     seeds: int,
 ) -> Job:
-    """Write a job's description. subframe: of all frames; catchers: the frames that show some.
-    Raises FarmError."""
+    """Write `job.json` and open the job.
+
+    subframe: the same for all frames; catchers: the frames that show shadow catchers. Raises
+    FarmError.
+    """
     blend = Path(home.file())
     head = JobHead(
         blend=blend.name,

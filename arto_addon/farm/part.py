@@ -1,5 +1,7 @@
-"""A part of a farm's job: one tile of one take of a frame under one seed, rendered and, where it is
-the only seed and no images are kept, fitted."""
+"""A part of a farm's job: one tile of one take of a frame, rendered with one seed.
+
+The part is also fitted if the job has a single seed and keeps no images.
+"""
 
 from __future__ import annotations
 
@@ -30,10 +32,10 @@ from .job import Job, estimate
 
 
 def render_part(job_folder: Path, number: int) -> Steps:
-    """Render a part of a job, unless it is there; returns its folder.
+    """Render a part of a job, unless it is there already; returns the part's folder.
 
-    It is there whole or not at all: killed, it is rendered again. Raises FarmError where the scene
-    is not what was planned, and what `capture` raises.
+    A part is there as a whole or not at all; a part whose process was killed is rendered again.
+    Raises FarmError where the scene has changed since the plan, and what `capture` raises.
     """
     job = Job(job_folder)
     part = job.part(number)
@@ -47,7 +49,7 @@ def render_part(job_folder: Path, number: int) -> Steps:
     begun = time.perf_counter()
     partial: Path | None = None
     try:
-        # with a name of its own: a farm may have given the part to two machines
+        # a folder with a unique name: a farm may have given the part to two machines
         partial = marked.scratch(folder, "part")
         with _on_stage(job, part, captured) as this:
             files = yield from render_tile(this.on, captured.head, part.tile, partial)
@@ -77,10 +79,12 @@ def render_part(job_folder: Path, number: int) -> Steps:
 
 
 def save_part(job_folder: Path, number: int) -> Steps:
-    """Save a part as .blend files that a Blender without ARTO renders, one for each of its renders;
-    returns the first. What they render to, `gather` finds. Raises as `render_part`, and FarmError
-    for what such a Blender would render otherwise: a moment between two frames, and a take that has
-    linked objects otherwise than their library."""
+    """Save a part as .blend files for a Blender without ARTO, one for each render of the part.
+
+    Returns the first file. `gather` finds the pictures that the files render to. Raises what
+    `render_part` raises, and FarmError for two cases that such a Blender would render differently:
+    a moment between two frames, and a take that changes linked objects.
+    """
     job = Job(job_folder)
     part = job.part(number)
     captured = job.set_of(part.frame, part.take)
@@ -111,14 +115,14 @@ def save_part(job_folder: Path, number: int) -> Steps:
 
 
 def _save_alone(scene: bpy.types.Scene, path: Path) -> None:
-    """Save a file of this scene alone, and of what it needs, at its frame."""
+    """Save a file with this scene and all that the scene needs, at the scene's frame."""
     scene.frame_start = scene.frame_end = scene.frame_current
     bpy.data.libraries.write(str(path), {scene}, path_remap="RELATIVE", compress=True)
 
 
 @contextmanager
 def _on_stage(job: Job, part: Part, captured: CaptureSet) -> Iterator[Asked]:
-    """The stage of a part, with its seed. Raises FarmError unless the scene is what was planned."""
+    """Set the stage for a part and its seed. Raises FarmError where the scene has changed."""
     head = captured.head
     given = Given(head.hemicube, head.told_route, None)
     samples = job.samples_of(head)
@@ -133,9 +137,9 @@ def _on_stage(job: Job, part: Part, captured: CaptureSet) -> Iterator[Asked]:
                     "every machine the same file and the same Blender, or plan again"
                 )
             if job.head.seeds > 1:
-                # a stretch of the one sequence that as many samples together have, which is better
-                # than as many seeds: its samples lie between those of the other stretches. All
-                # takes have the same: noise that they share goes where they are divided
+                # Each seed is a stretch of one long sequence of samples. Separate seeds would be
+                # worse: samples of one stretch lie between those of the others. All takes use the
+                # same stretch: the noise that they share cancels where takes are divided.
                 cycles = this.on.scene.cycles
                 cycles.use_sample_subset = True
                 cycles.sample_subset_length = samples
@@ -145,7 +149,7 @@ def _on_stage(job: Job, part: Part, captured: CaptureSet) -> Iterator[Asked]:
 
 
 def _differences(this: Asked, head: CaptureHead) -> list[str]:
-    """What of a scene is not as it was planned, in words."""
+    """What has changed in the scene since the plan, in words."""
     if head.shot is None:
         return ["it has no shot"]
     here = this.head
@@ -173,7 +177,7 @@ def _differences(this: Asked, head: CaptureHead) -> list[str]:
 
 
 def _fitted(captured: CaptureSet, part: Part, folder: Path, files: list[str]) -> Steps:
-    """Fit a part's tile into its folder -> its entry in `field.json`."""
+    """Fit a part's tile into the part's folder -> the tile's entry in `field.json`."""
     head = captured.head.with_tile(part.tile, files=tuple(files))
     rendered = CaptureSet(folder, unfinished=True, head=head)
     steps = fit_into(rendered, part.tile, folder / Stream.FIELD)

@@ -1,4 +1,4 @@
-"""Planning a farm's job: the patches, looked for here and once, and what is to be rendered."""
+"""Plan a farm's job: find the patches, once for all parts, and write what is to be rendered."""
 
 from __future__ import annotations
 
@@ -40,12 +40,13 @@ def plan(
     tiles: int | None,
     seeds: int,
 ) -> Steps:
-    """Write a job of so many tiles (default: as the memory says) and seeds for each frame into a
-    folder, and what farms take it by; returns its folder.
+    """Plan a job and write it into a folder, with templates for farms; returns the folder.
 
-    frames: default the one that the scene is at, between two of them as well. Raises FarmError for
-    a folder that has a job with parts already, or not the room for them, or a file that was never
-    saved; and what `capture` raises.
+    frames: default the scene's present frame, with its subframe; tiles: the number for each frame
+    (default: as many as memory makes necessary); seeds: the number for each tile.
+
+    Raises FarmError where the folder has a job with parts already, has no room for the parts, or
+    the file was never saved; and what `capture` raises.
     """
     if frames is not None and not frames:
         raise FarmError("there are no frames to plan: give a first and a last one")
@@ -58,7 +59,7 @@ def plan(
         )
     check_choice(scene.arto.support, pattern_set(scene.arto.patterns), scene.arto.separate)
     _make_way(folder, [scene.frame_current] if frames is None else list(frames))
-    # as `capture` takes the scene as it stands, and `capture_frames` whole frames together
+    # as with `capture`, a single frame keeps its subframe; as with `capture_frames`, several do not
     several = frames is not None
     subframe = 0.0 if several else scene.frame_subframe
     frames = [scene.frame_current] if frames is None else list(frames)
@@ -75,7 +76,7 @@ def plan(
             # whatever a script has moved is where it should be
             scene.view_layers[view_layer].update()
             heads = yield from _heads(scene, view_layer, folder, given, tiles, seeds)
-            # every frame is cut as the first one is
+            # cut all frames into as many tiles as the first
             tiles = len(heads[WHOLE].tiles)
             caution = caution or heads[WHOLE].caution
             if len(heads) > 1:
@@ -97,8 +98,10 @@ def plan(
 
 
 def _make_way(folder: Path, frames: list[int]) -> None:
-    """Remove the job that was planned into a folder before, of which nothing is rendered. Raises
-    FarmError where something else is in the way; then nothing has been touched."""
+    """Remove an earlier job from a folder, if nothing of it was rendered.
+
+    Raises FarmError, before anything is removed, where something else is in the way.
+    """
     header = folder / HEADER
     if os.path.lexists(header):
         try:
@@ -114,7 +117,7 @@ def _make_way(folder: Path, frames: list[int]) -> None:
             raise FarmError(
                 f"{there} was not planned by ARTO, or has rendered tiles: plan into another folder"
             )
-    # the description first, so that who is killed while planning leaves no job
+    # remove the head first: a process that is killed while planning then leaves no job
     if os.path.lexists(header):
         marked.remove_own_file(header, is_job)
     for there in sets:
@@ -127,7 +130,7 @@ def _frames_in(folder: Path) -> list[Path]:
 
 
 def _is_planned(folder: Path) -> bool:
-    """Whether a folder is a capture set of which nothing is rendered."""
+    """Whether a folder is a capture set without a rendered tile."""
     if marked.kind_of(folder) != "capture":
         return False
     try:
@@ -144,8 +147,10 @@ def _heads(
     tiles: int | None,
     seeds: int,
 ) -> Steps:
-    """Plan the takes of a frame -> the head of each one's capture set, by the take's name, that of
-    everything first."""
+    """Plan the takes of a frame -> the heads of their capture sets, by the take's name.
+
+    The take of everything comes first.
+    """
     with asked(scene, view_layer, given) as this:
         count = 1 + len(TAKES) * this.catchers
         _, first = yield from begun(this, folder, given, tiles, count)
@@ -160,15 +165,17 @@ def _heads(
 
 
 def _key_of(head: CaptureHead, seeds: int) -> str | None:
-    """The key of what all seeds make together: it is no capture of the samples of one."""
+    """The key of the capture that all seeds make together, with the samples of all."""
     if seeds == 1:
         return head.key
     return hashlib.sha256(f"{head.key} {seeds}".encode()).hexdigest()[:16]
 
 
 def _disk(head: CaptureHead, seeds: int) -> int:
-    """Bytes that the parts of a take have in a job's folder until they are gathered: light by light
-    where there are seeds to be averaged, or images are kept."""
+    """Bytes that the parts of a take need in a job's folder until they are gathered.
+
+    With several seeds, or where images are kept, the parts are images and not fitted tiles.
+    """
     light, field = (job.estimate(head, fitted).kept for fitted in (False, True))
     if head.kept:
         return seeds * light
@@ -176,7 +183,7 @@ def _disk(head: CaptureHead, seeds: int) -> int:
 
 
 def _check_disk(folder: Path, needed: int) -> None:
-    """Raise FarmError where a job's folder has not the room for its parts."""
+    """Raise FarmError where the disk of a job's folder has no room for the parts."""
     free = shutil.disk_usage(folder).free
     if free < needed * (1 + room.SPARE):
         raise FarmError(

@@ -1,4 +1,4 @@
-"""What farms take a job by: an OpenJD template, a job type for Flamenco, and lines of a shell."""
+"""Files that hand a job to a farm: an OpenJD template, a Flamenco job type, shell lines."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .job import Job
 OPENJD = "openjd.json"
 LINES = "commands.txt"
 FLAMENCO = "arto_capture.js"
-# Blender's own start-up, and the add-on alone of what its user has: workers have no preferences.
+# Factory settings and this add-on alone: workers have no user preferences.
 QUIET = ["-b", "--factory-startup", "--offline-mode", "--addons"]
 
 
 def write(job: Job) -> None:
-    """Write them into the job's folder."""
+    """Write these files into the job's folder."""
     write_text(job.folder / OPENJD, json.dumps(openjd(job), indent=1))
     write_text(job.folder / LINES, "\n".join(lines(job)) + "\n")
     script = Path(__file__).with_name(FLAMENCO).read_text(encoding="utf-8")
@@ -31,7 +31,7 @@ def write(job: Job) -> None:
 
 
 def check(folder: Path) -> None:
-    """Raise FarmError where a file of others has the name of one that is written."""
+    """Raise FarmError where a file that is not ARTO's has the name of a file to be written."""
     for name, says in ((OPENJD, '"ARTO '), (LINES, "--command arto gather"), (FLAMENCO, "ARTO")):
         path = folder / name
         if not os.path.lexists(path):
@@ -45,7 +45,7 @@ def check(folder: Path) -> None:
 
 
 def openjd(job: Job) -> dict[str, Any]:
-    """A job template by the Open Job Description of 2023-09: the parts, then what joins them."""
+    """A job template by the Open Job Description of 2023-09: render parts, then gather."""
 
     def run(*verb: str) -> dict[str, Any]:
         start = [*QUIET, "{{Param.Addon}}", "{{Param.Blend}}", "--command", "arto"]
@@ -78,8 +78,11 @@ def openjd(job: Job) -> dict[str, Any]:
 
 
 def lines(job: Job) -> list[str]:
-    """A line of a shell for each part, and the last one that gathers them. `$BLEND` is the file,
-    `$JOB` this folder; they may be run anywhere, in any order, but for the last."""
+    """A shell line for each part, and a last line that gathers the parts.
+
+    `$BLEND` is the file and `$JOB` the job's folder. The lines may run on any machine in any order,
+    except the last, which must run after all others.
+    """
     start = ["blender", *QUIET, ADDON]
     head = f'{shlex.join(start)} "$BLEND" --command arto'
     return [

@@ -1,1 +1,1 @@
-"""Long work in a Blender of its own, on a snapshot of the file."""
+"""Long work in a second Blender, on a snapshot of the file."""

@@ -1,7 +1,8 @@
 """The job's side: `blender -b snapshot.blend --command arto job task.json`.
 
-It does the work that a batch run does, by the paths of the artist's file, and writes down how far
-it is. It ends when it is told to on its standard input, or when that closes: the window is gone.
+The job does the same work as a batch run, with the paths of the artist's file, and writes down its
+progress. It ends when its standard input says so, or when its standard input closes, which means
+that the window is gone.
 """
 
 from __future__ import annotations
@@ -29,17 +30,17 @@ from .task import State, Task
 from .verbs import VERBS
 
 CANCEL = "cancel\n"
-# Seconds that a render is given to end by itself once it was told to.
+# Seconds that a render has to end by itself after it was told to.
 PATIENCE = 8.0
-# Times a second that the progress is written down.
+# How often a second the progress is written down.
 _OFTEN = 5.0
 
 
 def main(path: Path) -> int:
-    """Do what the task says; the exit code."""
+    """Do the work of a task; returns the exit code."""
     folder = path.parent
     if not marked.is_ours(folder, "job"):
-        # nothing is written into it then, and it is not removed when nobody listens
+        # the folder is someone else's: do not write into it, and do not remove it
         print(f"ARTO: {folder} is no folder of a job of ARTO's: start the work again", flush=True)
         return 1
     told = _Told(folder)
@@ -60,7 +61,9 @@ def main(path: Path) -> int:
         state, code = State(writer.share, f"{type(e).__name__}: {e}", end="failed"), 1
     told.done = True
     if told.alone:
-        marked.remove_quietly(folder, "job", folder.parent)  # nobody is left to do it
+        marked.remove_quietly(
+            folder, "job", folder.parent
+        )  # the window is gone, so nobody else removes the folder
     else:
         state.write(folder)
     print(f"ARTO job: {state.end}: {state.text}", flush=True)
@@ -89,7 +92,7 @@ def _steps(task: Task, folder: Path) -> Steps:
 
 
 def _turn_paths(folder: Path) -> None:
-    """Let the relative paths that Blender left alone lead from the artist's file again."""
+    """Make relative paths that Blender did not rewrite lead from the artist's file again."""
     if not home.file():
         return
     start = str(Path(home.file()).parent)
@@ -113,7 +116,7 @@ def _turn_paths(folder: Path) -> None:
 
 
 class _Told:
-    """Listens to the window: a line, or the end of the pipe, ends the work."""
+    """Listens to the window: a line ends the work, and so does the end of the pipe."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -123,10 +126,10 @@ class _Told:
         threading.Thread(target=self._listen, daemon=True).start()
 
     def _listen(self) -> None:
-        # by the descriptor: Python waits at its end for who reads its own stream
+        # read the descriptor, not `sys.stdin`: a Python that quits waits for readers of its stream
         self.alone = os.read(0, len(CANCEL)) == b""
         self.to_end = True
-        # Ctrl-C ends a render; a second one would kill Blender as it stands
+        # a first Ctrl-C ends a render; a second Ctrl-C would kill Blender at once
         signal.raise_signal(signal.SIGINT)
         until = time.monotonic() + PATIENCE
         while not self.done and time.monotonic() < until:
@@ -138,7 +141,7 @@ class _Told:
 
 
 class _Writer:
-    """Writes progress down, the samples of a render included."""
+    """Writes the progress down, with the samples of a render."""
 
     def __init__(self, folder: Path, told: _Told) -> None:
         self.folder = folder
@@ -157,7 +160,7 @@ class _Writer:
         said = self.text
         self.share, self.text = min(step.share, 1.0), step.text
         if self._render and self._first is None:
-            # what was there already took no time
+            # what an earlier run had done took no time in this one: count from here
             self._first = time.monotonic(), step.share
         self._write(soon=said != self.text)
         if said != self.text:
@@ -173,7 +176,9 @@ class _Writer:
             at, share = self._first
             if self.share > share and now - at > 1:
                 left = (now - at) / (self.share - share) * (1 - self.share)
-        with contextlib.suppress(OSError):  # a full disk is the work's to find
+        with contextlib.suppress(
+            OSError
+        ):  # progress matters little: the work itself reports a full disk
             State(self.share, self.text, now - self.begun, left).write(self.folder)
 
     @contextlib.contextmanager

@@ -1,7 +1,7 @@
-"""The window's side of a job: the one that runs in this session, and what became of the last.
+"""The window's side of a job: the running job, and how the last job ended.
 
-A job holds no data-block of the file that is open and no event of the window: it is a process and a
-folder. So whatever the artist does meanwhile, undo, another file, quitting, does not reach it.
+A job is a process and a folder. It holds no data-block of the open file and no event of the window,
+so undo or opening another file does not disturb it.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from .run import CANCEL, PATIENCE
 from .task import State
 from .verbs import VERBS, Verb
 
-# How often the window looks how far the job is.
+# Seconds between the window's looks at a job's progress.
 EVERY = 0.2
 LOG = "log.txt"
 
@@ -49,17 +49,17 @@ class Outcome:
 
 
 class SecondBlender:
-    """A job that runs: a Blender of its own on a snapshot in a folder of its own."""
+    """A running job: a second Blender that works on a snapshot in the job's own folder."""
 
     def __init__(self, verb: Verb, scene: bpy.types.Scene, view_layer: str) -> None:
-        """Take the snapshot and start. Raises SceneError, BusyError; then nothing is left."""
+        """Take the snapshot and start. Raises SceneError, BusyError, and then leaves no files."""
         self.verb: Verb = verb
         self.begun = time.monotonic()
         shot = shot_of(scene, view_layer)
         self.title = shot.title
         claimed = paths.claim(scene, view_layer)
-        # an undo step with the ID that the claim may have given is wanted: without it an undo
-        # would take it away, and a save after that lose what was captured
+        # The claim may have given the scene an ID. An undo would take the ID away, and a file
+        # saved after that would no longer find its captures: an undo step must hold the ID.
         self.scene_id = scene.arto.scene_id
         self.blend = bpy.data.filepath
         self.light = scene.arto.look.strip()
@@ -91,12 +91,12 @@ class SecondBlender:
         self.state = State()
 
     def look(self) -> bool:
-        """Whether it still runs; `state` is then how far it is, else how it ended."""
+        """Read how far the job is, or how it ended, into `state` -> whether the job still runs."""
         running = self.process.poll() is None
         try:
             found = State.read(self.folder)
         except ArtoError as e:
-            # while the job runs it writes another one soon
+            # a running job soon writes its state anew
             found = self.state if running else State(self.state.share, str(e), end="failed")
         if running:
             self.state = found if not found.end else self.state
@@ -119,25 +119,25 @@ class SecondBlender:
     def _last_lines(self) -> str:
         with contextlib.suppress(OSError):
             text = (self.folder / LOG).read_text(encoding="utf-8", errors="replace")
-            # for the console; the panel has the first line
+            # the last lines are for the console; the panel shows the first line
             return "\n" + "\n".join(text.strip().splitlines()[-8:])
         return ""
 
     @property
     def input(self) -> IO[bytes]:
-        """What the job listens to."""
-        assert self.process.stdin is not None  # it was started with a pipe
+        """The job's standard input, which the job listens to."""
+        assert self.process.stdin is not None  # the process was started with a pipe
         return self.process.stdin
 
     def cancel(self) -> None:
-        """Tell it to end: at the next step, or in the middle of a render."""
+        """Tell the job to end: at its next step, or in the middle of a render."""
         self.told = self.told or time.monotonic()
         with contextlib.suppress(OSError, ValueError):
             self.input.write(CANCEL.encode())
             self.input.flush()
 
     def remove(self) -> None:
-        """Remove its folder, once it has ended."""
+        """Remove the folder of a job that has ended."""
         if log := getattr(self, "log", None):
             log.close()
         self.lock.__exit__(None, None, None)
@@ -145,12 +145,12 @@ class SecondBlender:
 
     @property
     def spent(self) -> float:
-        """Seconds since it was begun."""
+        """Seconds since the job began."""
         return time.monotonic() - self.begun
 
     @property
     def line(self) -> str:
-        """How far it is, in words."""
+        """The progress, in words."""
         if self.told:
             return "stopping"
         left = self.state.left
@@ -158,7 +158,7 @@ class SecondBlender:
         return f"{self.state.share:.0%}, " + (f"{clock(left)} left" if left is not None else spent)
 
 
-# No window of a console, and the artist's work first.
+# On Windows: no console window, and a lower priority than the artist's work.
 _QUIETLY: dict = (
     {"creationflags": 0x08000000 | 0x00004000} if sys.platform == "win32" else {}  # type: ignore
 )
@@ -170,7 +170,7 @@ def _command(blend: Path, task: Path) -> list[str]:
 
 
 def _remove_leftovers(claimed: Path) -> None:
-    """Folders of jobs whose windows are gone without a word."""
+    """Remove the folders of jobs that no process holds any more, as after a crash."""
     for folder in claimed.glob("job-*"):
         if not Lock.holder(folder):
             marked.remove_quietly(folder, "job", claimed)
@@ -178,17 +178,17 @@ def _remove_leftovers(claimed: Path) -> None:
 
 current: SecondBlender | None = None
 outcome: Outcome | None = None
-# What is done in the window with what a job has made, by verb.
+# By verb, what the window does with the result of a job.
 finishers: dict[Verb, Callable[[SecondBlender], str]] = {}
 
 
 def busy() -> str:
-    """What runs, in words for a button that has to wait; empty where nothing does."""
+    """What runs, in words for a button that has to wait; empty where nothing runs."""
     return f"ARTO is {VERBS[current.verb].doing} {current.title}" if current else ""
 
 
 def start(verb: Verb, scene: bpy.types.Scene, view_layer: str) -> SecondBlender:
-    """Start a job. Raises BusyError where one runs, SceneError; the window goes on."""
+    """Start a job and return at once. Raises SceneError, and BusyError where a job runs already."""
     global current, outcome
     if current:
         raise BusyError(f"{busy()}: wait until it is done, or cancel it")
@@ -205,7 +205,7 @@ def cancel() -> None:
 
 
 def _follow() -> float | None:
-    """Look how far the job is; when it has ended, do what is to be done in the window."""
+    """Look at the job's progress; after its end, let the window use the result."""
     global current, outcome
     if current is None:
         return None
@@ -215,7 +215,7 @@ def _follow() -> float | None:
         watch.redraw()
         return EVERY
     if job.state.end == "done" and _in_the_middle():
-        return EVERY  # of a drag or a stroke: the window is not touched
+        return EVERY  # during a drag or a stroke the window is left alone
     try:
         level = {"done": "INFO", "cancelled": "WARNING"}.get(job.state.end, "ERROR")
         text = job.state.text
@@ -237,7 +237,8 @@ def _follow() -> float | None:
     return None
 
 
-# What a person has in hand: other add-ons have operators that run all the time.
+# Operators that a person has in hand. Other modal operators do not count: add-ons have some that
+# run all the time.
 _HANDS = (
     "TRANSFORM_",
     "PAINT_",
@@ -259,7 +260,7 @@ _RENDERS = re.compile(r"render (\d+) of (\d+): \d+ basis images")
 
 
 def plain(text: str) -> str:
-    """What a job is doing, in an artist's words."""
+    """A job's text in an artist's words."""
     found = _RENDERS.fullmatch(text)
     if found is None:
         return text
@@ -272,16 +273,16 @@ def _show_share(job: SecondBlender | None) -> None:
     if job:
         text = f"{busy()}: {plain(job.state.text)}, {job.line}   (ESC: cancel)"
     for window in bpy.context.window_manager.windows:
-        # a timer has no window of its own after a file was opened, and Blender asks for one here
+        # Blender needs a window here, and a timer has none after a file was opened
         with bpy.context.temp_override(window=window):
             window.workspace.status_text_set(text)
 
 
 def end() -> None:
-    """Blender quits, or ARTO is switched off: the job ends with it, finished tiles stay.
+    """Let the job end because Blender quits or ARTO is switched off. Finished tiles stay.
 
-    It ends because its input closes, as it does when this process is killed, and removes its folder
-    by itself: there is no need to wait for it.
+    The job ends because its input closes, which also happens when this process is killed. It
+    removes its folder by itself, so nothing waits for it here.
     """
     global current
     if current is None:
@@ -300,7 +301,7 @@ def _quitting(*_: object) -> None:
 
 
 def register() -> None:
-    if not bpy.app.background:  # without a window there is no job to end
+    if not bpy.app.background:  # jobs are started only from a window
         when_quitting(_quitting)
 
 

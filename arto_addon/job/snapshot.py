@@ -1,8 +1,9 @@
 """The snapshot: the artist's file as it is in memory, saved for a job to work on.
 
-It is a copy of the .blend with unsaved edits, in a folder of the job's own. Blender turns its
-relative paths so that they lead to the same files; what it does not turn, the job does (`run`).
-Images that were painted and not saved are in no file: their pixels lie beside it.
+The snapshot is a copy of the .blend with its unsaved edits, in the job's own folder. Blender
+rewrites relative paths so that they lead to the same files. The job rewrites those that Blender
+leaves (`run`). Images that were painted and not saved are in no file: their pixels are written
+beside the snapshot.
 """
 
 from __future__ import annotations
@@ -18,14 +19,14 @@ from ..blender import devices
 from .task import Painted, Task
 from .verbs import Verb
 
-# Not empty while a snapshot is saved: for who does something before a file of the artist's is.
+# Not empty while a snapshot is saved. Handlers that act before the artist saves look here first.
 taking: list[bool] = []
 
 
 def take(folder: Path, verb: Verb, scene: bpy.types.Scene, view_layer: str) -> tuple[Path, Path]:
-    """Save the snapshot and its task into `folder` -> (.blend, task). Raises SceneError.
+    """Save the snapshot and its task into `folder` -> paths of (.blend, task). Raises SceneError.
 
-    Nothing of the artist's changes: not the file's name, nor whether it has unsaved changes.
+    The open file keeps its name, and still counts as changed if it was.
     """
     blend = folder / (Path(bpy.data.filepath).name or "untitled.blend")
     packing = bpy.data.use_autopack
@@ -56,7 +57,7 @@ def take(folder: Path, verb: Verb, scene: bpy.types.Scene, view_layer: str) -> t
 
 
 def in_no_file(image: bpy.types.Image) -> bool:
-    """Whether an image was painted and not saved. Raises SceneError for one with tiles."""
+    """Whether an image was painted and not saved. Raises SceneError if such an image has tiles."""
     if not image.is_dirty or image.source not in {"FILE", "GENERATED", "TILED"}:
         return False
     if image.source == "TILED":
@@ -68,7 +69,7 @@ def in_no_file(image: bpy.types.Image) -> bool:
 
 
 def painted_pixels(image: bpy.types.Image, folder: Path) -> str:
-    """Write an image's pixels into a folder -> the name of the .npy."""
+    """Write an image's pixels into a folder -> the name of the .npy file."""
     pixels = np.empty(len(image.pixels), np.float32)
     image.pixels.foreach_get(pixels)
     name = f"painted_{image.session_uid}.npy"
@@ -82,7 +83,7 @@ def _painted(image: bpy.types.Image, folder: Path) -> Painted:
 
 
 def _link_caches(folder: Path) -> None:
-    """Caches of simulations lie beside the .blend, in a folder of its name."""
+    """Link the simulation caches, a folder beside the .blend, to where the snapshot is."""
     if not bpy.data.filepath:
         return
     blend = Path(bpy.data.filepath)

@@ -1,7 +1,7 @@
 """What a job is told, and what it tells: two small files beside the snapshot that it works on.
 
-`task.json` is written by the window and read by the job, `progress.json` the other way round, whole
-each time.
+The window writes `task.json` and the job reads it. The job writes `progress.json`, the whole file
+each time, and the window reads it.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ End = Literal["", "done", "cancelled", "failed"]
 class Painted:
     """An image whose pixels are in no file.
 
-    library: the path of the library that the image is of, empty where it is of none; pixels: the
-    name of the .npy beside the snapshot.
+    library: the path of the library that the image is from, empty for an image of the file itself;
+    pixels: the name of the .npy file beside the snapshot.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Task:
 
     blend: the artist's file, empty where it was never saved; devices: the artist's render devices,
     None where Cycles is switched off; painted: images whose pixels are in no file; scripts: whether
-    the window has refused no script of the file.
+    the window has allowed all scripts of the file.
     """
 
     verb: Verb
@@ -62,7 +62,7 @@ class Task:
 
     @staticmethod
     def read(path: Path) -> Task:
-        """Read a task. Raises ArtoError for a file that is none."""
+        """Read a task. Raises ArtoError where the file is no task."""
         said = Description(path, _no_task)
         said.only("verb", "scene", "view_layer", "blend", "devices", "painted", "scripts")
         return Task(
@@ -106,8 +106,8 @@ def _no_task(text: str) -> ArtoError:
 class State:
     """How far a job is.
 
-    share: how much is done, 0 to 1; spent: seconds; left: seconds, None while nobody knows; text:
-    what it is doing, or how it ended; result: the file or folder that it made.
+    share: how much is done, 0 to 1; text: what the job is doing, or how it ended; spent: seconds so
+    far; left: seconds to go, None while not known; result: the file or folder that was made.
     """
 
     share: float = 0.0
@@ -122,8 +122,10 @@ class State:
 
     @staticmethod
     def read(folder: Path) -> State:
-        """The last state written, the first one where none is yet. Raises ArtoError for a file that
-        is none."""
+        """Read the last state that was written; before any, the state of a job that starts.
+
+        Raises ArtoError where the file is no state.
+        """
         if not (folder / PROGRESS).exists():
             return State()
         said = Description(folder / PROGRESS, _no_state)

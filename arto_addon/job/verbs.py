@@ -37,7 +37,7 @@ class Work:
     """What a verb stands for.
 
     steps: the work on a scene and a view layer; doing: what the artist is told, before the shot's
-    title; captures: whether the work changes what was captured, so that nobody else may.
+    title; captures: whether the work changes the capture, so that no other process may meanwhile.
     """
 
     steps: Callable[[bpy.types.Scene, str], Steps]
