@@ -72,9 +72,9 @@ def test_glass_that_is_clear_to_shadow_rays(tmp_path):
     add_mesh(scene, "Pane", window, [(0, 1, 2, 3)], architects_glass())
     scene.cycles.caustics_refractive = scene.cycles.caustics_reflective = False
     warning = said(scene, patches=4)
-    assert warning and abs(warning["ratio"] - 1) < 0.05
-    assert "'Architect's Glass' lets shadow rays through" in warning["text"]
-    assert "a render for each pattern" in warning["text"]
+    assert warning and abs(warning.ratio - 1) < 0.05
+    assert "'Architect's Glass' lets shadow rays through" in warning.text
+    assert "a render for each pattern" in warning.text
 
 
 def test_a_pane_that_throws_no_shadow(tmp_path):
@@ -82,7 +82,7 @@ def test_a_pane_that_throws_no_shadow(tmp_path):
     pane = add_mesh(scene, "Pane", window, [(0, 1, 2, 3)], material("Board", Roughness=1.0))
     pane.visible_shadow = False
     warning = said(scene)
-    assert warning and "'Pane' throws no shadow" in warning["text"]
+    assert warning and "'Pane' throws no shadow" in warning.text
 
 
 @pytest.mark.parametrize("flag", ["visible_shadow", "visible_diffuse"])
@@ -96,7 +96,7 @@ def test_a_soft_shadow_that_is_not_a_worlds(tmp_path, flag):
         scene.objects[name].scale = (1.4, 1.4, 1.4)
     warning = said(scene, patches=2)
     words = "'Matt' throws no shadow" if flag == "visible_shadow" else "'Matt' is hidden from"
-    assert warning and words in warning["text"]
+    assert warning and words in warning.text
 
 
 @pytest.mark.newest
@@ -129,13 +129,13 @@ def test_a_closed_dome_is_said(tmp_path):
     scene, window = room(tmp_path)
     add_mesh(scene, "Ceiling", window, [(0, 1, 2, 3)], material("Ceiling", Roughness=1.0))
     warning = said(scene)
-    assert warning and warning["dark"]
-    assert "no light from outside reaches the picture" in warning["text"]
+    assert warning and warning.dark
+    assert "no light from outside reaches the picture" in warning.text
     # a lamp inside does not let light in
     lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
     lamp.data.energy = 1000
     scene.collection.objects.link(lamp)
-    assert said(scene)["dark"]
+    assert said(scene).dark
 
 
 def test_a_warning_is_kept_with_the_capture_and_shown(tmp_path):

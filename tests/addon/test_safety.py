@@ -21,10 +21,12 @@ from arto.arto_addon.relight import many
 from arto.arto_addon.relight.relight import check_finite
 from arto.arto_addon.world import kept as maps
 from arto.core import marked
-from arto.core.capture.capture_set import describe, write_header
+from arto.core.capture.head import CaptureHead, write
+from arto.core.capture.tile_entry import TileEntry
 from arto.core.errors import CaptureSetError, FarmError, FieldError, FilesError, SceneError
 from arto.core.hemicube import Hemicube
 from arto.core.patterns import pattern_set
+from arto.core.region import Region
 
 
 def others(folder: Path) -> Path:
@@ -85,9 +87,8 @@ def test_leftovers_of_jobs_are_told_by_their_mark(tmp_path):
 
 def planned(folder: Path, done: bool = False) -> Path:
     """A capture set as a job plans it."""
-    head = describe(Hemicube(patches=1), pattern_set("linear"), (2, 3), key="x")
-    head["tiles"] = [{"region": [0, 0, 3, 2], "files": [], "done": done}]
-    write_header(folder, head)
+    tile = TileEntry(Region(0, 0, 3, 2), done=done)
+    write(folder, CaptureHead(Hemicube(patches=1), pattern_set("linear"), 2, 3, (tile,), "x"))
     return folder
 
 

@@ -19,6 +19,7 @@ from arto.core.errors import BusyError, FilesError
 from arto.core.field.writer import FieldWriter
 from arto.core.files import Lock, replace_folder, settle, whole, write_text
 from arto.core.hemicube import Hemicube
+from arto.core.patterns import pattern_set
 from arto.core.regular import read_regular
 
 needs_links = pytest.mark.skipif(os.name == "nt", reason="links need rights there")
@@ -102,7 +103,7 @@ def test_what_the_version_before_made_is_known(tmp_path: Path) -> None:
     cube = Hemicube(faces=("top",), patches=1)
     captured, field = tmp_path / "capture", tmp_path / "field"
     basis = np.ones((1, 1, 2, 2, 3), np.float32)
-    capture_set.write(captured, cube, capture_set.pattern_set("white"), basis)
+    capture_set.write(captured, cube, pattern_set("white"), basis)
     FieldWriter(field, cube, (2, 2)).close()
     kinds: list[tuple[Path, marked.Kind]] = [(captured, "capture"), (field, "field")]
     for folder, kind in kinds:
