@@ -7,6 +7,8 @@ import json
 import sys
 from pathlib import Path
 
+from . import mirrors_command
+
 
 def _demo(options: argparse.Namespace) -> None:
     from .demo import demo
@@ -286,6 +288,8 @@ def main() -> int:
     c.add_argument("--plot", type=Path, default=Path("out/accuracy.png"))
     c.add_argument("--sheet", type=Path, default=Path("out/accuracy_sheet.png"))
     c.set_defaults(run=_accuracy)
+
+    mirrors_command.add(commands)
 
     c = commands.add_parser("noise", help="where to take out the noise of a capture")
     c.add_argument("--json", type=Path, default=Path("out/noise.json"))

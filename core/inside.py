@@ -23,7 +23,7 @@ from .hemicube import Hemicube
 from .light.environment import Environment
 from .light.layers import part_of
 from .light.light import PatchLight
-from .supports import BOX, LINEAR
+from .supports import BELL, BOX, LINEAR
 
 # The place of each face in the unfolded hemicube, in faces from its left and top. Faces are seen
 # from inside. The back is in the middle, as the camera of an upright hemicube sees it.
@@ -109,7 +109,7 @@ def parts_at(field: Field, light: PatchLight, x: int, y: int) -> list[Contributi
 
 def _box_of(support: str, parameters: NDArray) -> tuple[float, float, float, float] | None:
     """A rectangle to draw for a support, in patch coordinates."""
-    if support == BOX.name:
+    if support in (BOX.name, BELL.name):
         u0, u1, v0, v1 = (float(p) for p in parameters)
         return u0, u1, v0, v1
     if support == LINEAR.name:

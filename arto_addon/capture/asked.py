@@ -91,8 +91,9 @@ def asked(
         otherwise = held.enter_context(take(seen, name))
         hemicube = given.hemicube if given else geometry(scene, seen)
         # other routes need several renders, whose paths differ: no grain belongs to all
-        grain = settings.grain and settings.route == Route.ALL
         patterns = pattern_set(settings.patterns)
+        # packed patterns have theirs
+        grain = settings.grain and settings.route == Route.ALL and patterns.grey
         prepare(on, layers=len(patterns) + grain)
         # the other takes need light alone, and each pass less saves memory
         on.scene.view_layers[0].use_pass_position = name == WHOLE

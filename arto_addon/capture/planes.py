@@ -15,7 +15,7 @@ import numpy as np
 from ...core.capture.names import GRAIN, GROUP, group_name
 from ...core.faces import FACE_NAMES
 from ...core.hemicube import Hemicube
-from ...core.patterns import PatternSet, pattern_set
+from ...core.patterns import BASE, SHARP, PatternSet, pattern_set
 from ..blender.nodes import Nodes, made_of_nodes, new_material
 from ..stage.stage import Stage, free_mark
 
@@ -92,20 +92,27 @@ def _grain(nodes: Nodes) -> Any:
     return nodes.math("GREATER_THAN", noise.outputs["Value"], 0.5)
 
 
-def _radiance(nodes: Nodes, name: str, patterns: PatternSet) -> Any:
-    """What a pattern of the set, or `GRAIN`, emits: a socket or a value."""
+def _radiance(nodes: Nodes, name: str, patterns: PatternSet) -> list[Any]:
+    """What a pattern of the set, or `GRAIN`, emits: sockets or values, one for all channels or one
+    for each."""
     if name == GRAIN:
-        return _grain(nodes)
-    return _polynomial(nodes, patterns.coefficients[patterns.patterns.index(name)])
+        return [_grain(nodes)]
+    return [
+        _grain(nodes) if row is None else _polynomial(nodes, row) for row in patterns.emission(name)
+    ]
 
 
-def _shader(nodes: Nodes, radiance: Any) -> Any:
-    """Emission, plus what lies behind.
+def _shader(nodes: Nodes, radiance: list[Any]) -> Any:
+    """Emission, plus what lies behind; radiance: see `_radiance`.
 
     The background lies behind the last pattern. There Cycles adds the scene's sun lamps to
     scattered rays. An opaque patch would hide the suns' mirror images.
     """
-    light = nodes.add("ShaderNodeEmission", (1, 1, 1, 1), radiance).outputs[0]
+    if len(radiance) == 1:
+        light = nodes.add("ShaderNodeEmission", (1, 1, 1, 1), radiance[0]).outputs[0]
+    else:
+        colour = nodes.add("ShaderNodeCombineColor", *radiance).outputs[0]
+        light = nodes.add("ShaderNodeEmission", colour, 1.0).outputs[0]
     behind = nodes.add("ShaderNodeBsdfTransparent").outputs[0]
     return nodes.add("ShaderNodeAddShader", light, behind).outputs[0]
 
@@ -140,10 +147,13 @@ def overriding_material(
     nodes = Nodes(tree)
     number = tree.nodes.new("ShaderNodeAttribute")
     number.attribute_type, number.attribute_name = "OBJECT", PATTERN
-    total: Any = 0.0
-    for i, name in enumerate(names, 1):
+    shown = [_radiance(nodes, name, patterns) for name in names]
+    total: list[Any] = [0.0] * max(map(len, shown))
+    for i, channels in enumerate(shown, 1):
         mine = nodes.math("COMPARE", number.outputs["Fac"], float(i), 0.5)
-        total = nodes.math("MULTIPLY_ADD", mine, _radiance(nodes, name, patterns), total)
+        for c in range(len(total)):
+            value = channels[c if len(channels) > 1 else 0]
+            total[c] = nodes.math("MULTIPLY_ADD", mine, value, total[c])
     plane = nodes.math("GREATER_THAN", number.outputs["Fac"], 0.5)
     output = tree.get_output_node("CYCLES") or tree.nodes.new("ShaderNodeOutputMaterial")
     for socket, pattern in (("Surface", _shader(nodes, total)), ("Volume", None)):
@@ -180,6 +190,16 @@ def _plane(name: str, corners: np.ndarray, material: Any, made: Callable[[Any], 
     return plane
 
 
+def _seen_by(plane: Any, paths: str) -> None:
+    """Hide a plane from the light paths that are not to see it; see `patterns.PATHS`.
+
+    A path sees either all planes of the base or all of the sharp ones: what it left last is either
+    a diffuse surface or a volume, or it is one that reflects or refracts.
+    """
+    plane.visible_diffuse = plane.visible_volume_scatter = paths != SHARP
+    plane.visible_glossy = plane.visible_transmission = paths != BASE
+
+
 def build(
     collection: bpy.types.Collection,
     hemicube: Hemicube,
@@ -204,8 +224,40 @@ def build(
         distance = hemicube.size * (1 + GAP * used.index(pattern))
         plane = _plane(name, centre + distance * hemicube.corners(k), materials[pattern], made)
         plane.lightgroup = group
+        if pattern != GRAIN:
+            _seen_by(plane, patterns.paths(pattern))
         plane[PATTERN] = float(used.index(pattern) + 1)
         collection.objects.link(plane)
+
+
+# The number of no pattern, as property `PATTERN`.
+NONE = 1000.0
+
+
+def _threshold(
+    collection: bpy.types.Collection, hemicube: Hemicube, made: Callable[[Any], Any]
+) -> None:
+    """A clear shell before the patterns, at which Cycles tosses its coin.
+
+    Russian roulette ends a path, or makes it count for more, at the first surface that it meets
+    after a bounce, and after that surface's emission. Were this the white pattern, it would see
+    other weights than the patterns behind it, and their ratio would be off by that.
+    """
+    material = made(new_material("ARTO Threshold"))
+    material.node_tree.nodes.clear()
+    nodes = Nodes(material.node_tree)
+    clear = nodes.add("ShaderNodeBsdfTransparent").outputs[0]
+    nodes.add("ShaderNodeOutputMaterial", clear)
+    centre, distance = np.array(hemicube.centre), hemicube.size * (1 - GAP)
+    corners = [centre + distance * hemicube.corners(k) for k in range(len(hemicube))]
+    mesh = made(bpy.data.meshes.new("ARTO Threshold"))
+    quads = [tuple(range(4 * k, 4 * k + 4)) for k in range(len(corners))]
+    mesh.from_pydata(np.concatenate(corners).tolist(), [], quads)
+    mesh.materials.append(material)
+    shell = made(bpy.data.objects.new("ARTO Threshold", mesh))
+    shell.visible_camera = shell.visible_shadow = False
+    shell[PATTERN] = NONE
+    collection.objects.link(shell)
 
 
 @contextmanager
@@ -240,12 +292,14 @@ def lit(
         collection = note(bpy.data.collections.new("ARTO Capture"))
         on.scene.collection.children.link(collection)
         build(collection, hemicube, patterns, images, note, free_mark(), sampled)
+        planes = list(collection.objects)
+        _threshold(collection, hemicube, note)
         # the artist's groups come first: their lamps are sampled, and of the groups of sampled
         # lights Cycles can only tell the first apart
         for name in on.own_groups if own else ():
             if not GROUP.search(f"Combined_{name}"):  # a group named as ours stays in `own`
                 layer.lightgroups.add(name=name)
-        for plane in collection.objects:
+        for plane in planes:
             layer.lightgroups.add(name=plane.lightgroup)
         yield
     finally:

@@ -14,10 +14,10 @@ from ...core.capture.agreement import Caution
 from ...core.capture.kinds import Keep, Route
 from ...core.capture.names import GRAIN
 from ...core.capture.refine import check as can_refine
-from ...core.errors import ArtoError
+from ...core.errors import ArtoError, SceneError
 from ...core.fit.choice import check as check_choice
 from ...core.hemicube import Hemicube
-from ...core.patterns import pattern_set
+from ...core.patterns import LobedSet, pattern_set
 from ...core.region import Region
 from ...core.units import size
 from ..stage.settings import samples_of
@@ -83,6 +83,12 @@ def planned(
         route, caution = yield from light_route(on, hemicube)
         if settings.adaptive and route != Route.SAMPLED:
             hemicube = yield from refined(on, hemicube, ADAPTIVE_SHARE * len(hemicube))
+    if route == Route.SAMPLED and isinstance(pattern_set(settings.patterns), LobedSet):
+        # a patch that is hidden from diffuse rays lights nothing diffuse by shadow rays
+        raise SceneError(
+            "light comes into this scene by shadow rays alone, of which the patterns 'Packed, by "
+            "Lobe' know nothing: choose the patterns '1, u, v'"
+        )
     grain = grain and route == Route.ALL
     names = [*pattern_set(settings.patterns).patterns, *([GRAIN] if grain else [])]
     plan = [len(images) for images in render_plan(route, hemicube, names)]

@@ -14,9 +14,9 @@ from ...core.field.writer import replace_layers, write_head
 from ..blender import denoise
 from ..work import Progress, Steps
 
-# With so many samples of a capture or more, the noise of its guides does no harm
-# (docs/accuracy.md).
-CLEAN_SAMPLES = 64
+# With so many samples of a capture or more, the noise of its guides does no harm. In glass, where a
+# guide shows what is behind, 64 samples leave a screen of dots (docs/measurements.md).
+CLEAN_SAMPLES = 1024
 
 
 def guides_of(field: Field) -> dict[str, NDArray]:

@@ -157,7 +157,10 @@ class Shown:
     def denoised(self, *parts: NDArray[np.float32]) -> NDArray[np.float32]:
         """Denoise pictures of what the field shows, (H, W, 3), one by one -> their sum."""
         clean = guides.clean(self.field)
-        found = denoise.denoise(self.guides, *parts, clean=clean, like=self.scene)
+        # of a shot with catchers these are differences of two takes, which may be below 0
+        lamps_apart = len(parts) == 2 and len(self.takes) == 1
+        way = denoise.with_lamps if lamps_apart else denoise.denoise
+        found = way(self.guides, *parts, clean=clean, like=self.scene)
         # a denoiser lets light at outlines spill into empty pixels, where it would brighten footage
         nothing = self.field.layer("alpha") == 0
         for part in parts:

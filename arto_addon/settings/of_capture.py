@@ -13,6 +13,15 @@ _PATTERNS = {
     "moments": ("1, u, u², v, v²", "Five patterns that identify a box"),
     "moments_uv": ("1, u, u², v, v², uv", "Six patterns that also show a tilt"),
     "linear": ("1, u, v", "Three patterns that show where in a patch the light comes from"),
+    "packed": (
+        "Packed",
+        "All six moments and the noise, packed into the colour channels of three patterns",
+    ),
+    "packed_linear": ("Packed 1, u, v", "The same of the first moments, in two patterns"),
+    "lobes": (
+        "Packed, by Lobe",
+        "Packed patterns of what reflects and refracts, and of what scatters, each by itself",
+    ),
     "paper": ("Paper's nine", "White, four diagonal gradients and their inverses"),
     "white": ("White only", "One pattern: a reflection coefficient and no support"),
 }
@@ -24,6 +33,7 @@ _SUPPORTS = {
     "quadratic": ("Quadratic", "The light taken as a paraboloid over each patch"),
     "oriented_box": ("Oriented Box", "A tilted rectangle; needs the pattern uv"),
     "gaussian": ("Gaussian", "A tilted elliptical Gaussian; needs the pattern uv"),
+    "bell": ("Bell", "As the box, but round at its rim"),
     "double": ("Two Components", "A broad base and a narrow box; needs the pattern uv"),
     "search": ("Paper's Search", "The box by the paper's Algorithm 1; slow"),
     "stage_and_matte": ("Light Stage and Matte", "A box in the brightest patch, whole the others"),

@@ -69,7 +69,8 @@ def prepare(on: Stage, layers: int) -> None:
     layers: how many patterns a path may cross, each of which counts as a transparent bounce.
     """
     s = on.scene.arto
-    through = on.scene.cycles.transparent_max_bounces + layers
+    # and the shell before them, see `planes`
+    through = on.scene.cycles.transparent_max_bounces + layers + 1
     words: dict[object, object] = {SAMPLES: samples_of(on.scene), SEED: s.seed, THROUGH: through}
     for change in CHANGES:
         on.change(change.setting, words.get(change.to, change.to))

@@ -45,7 +45,9 @@ class BasisImages:
     hemicube : Hemicube
     patterns : PatternSet
     grain : bool
-        Whether the grain was captured, see `names.GRAIN`.
+        Whether each patch has an image of the grain, see `names.GRAIN`.
+    together : bool
+        Whether all images of a patch are of one render. Otherwise no pattern shows grain.
 
     Raises
     ------
@@ -61,9 +63,11 @@ class BasisImages:
         hemicube: Hemicube,
         patterns: PatternSet,
         grain: bool = False,
+        together: bool = True,
     ) -> None:
         self.folder, self.region = folder, region
         self.hemicube, self.patterns, self.grain = hemicube, patterns, grain
+        self.together = together
         expected = Expected(folder, self.shape, hemicube, patterns, grain)
         self._files = ExitStack()
         try:
@@ -110,7 +114,7 @@ class BasisImages:
         ----------
         k : int
         patterns : PatternSet
-            Where one pattern shows R, the images of the others are not read.
+            Where some patterns add up to R, the images of the others are not read.
 
         Returns
         -------
@@ -124,9 +128,11 @@ class BasisImages:
         which = patterns.shown_by
         if which is None:
             return patterns.coefficient(self.images(k))
-        name = patterns.patterns[which]
-        total, *others = ((s.share, s.image(k, name)) for s in self._seeds)
-        return _mean(total, others)
+        found = []
+        for name in (patterns.patterns[p] for p in which):
+            total, *others = ((s.share, s.image(k, name)) for s in self._seeds)
+            found.append(_mean(total, others))
+        return sum(found[1:], found[0])
 
     def images_at(self, k: int, pixels: NDArray[np.intp]) -> NDArray[np.float32]:
         """Read the basis images of a patch in some pixels.
@@ -159,7 +165,9 @@ class BasisImages:
             None where it was not captured.
         """
         if not self.grain:
-            return None
+            if self.patterns.grey or not self.together:
+                return None
+            return self.patterns.grains(self.images(k))
         white = self.patterns.coefficient(self.images(k)).sum(axis=-1)
         total, *others = ((s.share, s.image(k, GRAIN).sum(axis=-1)) for s in self._seeds)
         return np.asarray(2 * _mean(total, others) - white)
@@ -224,11 +232,12 @@ class BasisImages:
             basis[k] = images
 
         found = self.around(keep)
-        grain = None
-        if self.grain:
-            grains = [self.grain_of(k) for k in range(len(self.hemicube))]
-            grain = np.stack([g for g in grains if g is not None])
-        return TileData(self.region, basis, found.own, found.alpha, found.guides, grain)
+        grains = [self.grain_of(k) for k in range(len(self.hemicube))]
+        there = [g for g in grains if g is not None]
+        grain = np.stack(there) if there else None
+        return TileData(
+            self.region, basis, found.own, found.alpha, found.guides, grain, self.together
+        )
 
 
 def _mean(first: tuple[float, NDArray], others: list[tuple[float, NDArray]]) -> NDArray:

@@ -21,6 +21,7 @@ from ..region import Region
 from . import head as heads
 from .basis_images import BasisImages
 from .head import CaptureHead
+from .kinds import Route
 from .names import COMBINED, group_name
 from .tile_data import TileData
 from .tile_entry import TileEntry
@@ -104,6 +105,8 @@ class CaptureSet:
             self.hemicube,
             self.patterns,
             bool(self.head.grain),
+            # the paths of two renders differ: the grain of one is not that of the other
+            self.head.route in (None, Route.ALL),
         )
 
     def read(self, tile: int) -> TileData:

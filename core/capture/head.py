@@ -26,6 +26,8 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .. import marked
 from ..description import MOST_TILES
 from ..errors import CaptureSetError, HemicubeError, PatternError, ShotError
@@ -203,7 +205,7 @@ class CaptureHead:
         return {
             "format": FORMAT,
             "patches": len(self.hemicube),
-            "pattern_polynomials": {name: list(row) for name, row in polynomials},
+            "pattern_polynomials": {name: np.array(row).tolist() for name, row in polynomials},
         }
 
     def to_json(self) -> dict[str, Any]:

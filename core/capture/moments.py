@@ -17,7 +17,7 @@ Examples
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -70,7 +70,7 @@ class Moments:
         Moments
         """
         # float64: a narrow support is a small difference of large moments
-        shared = patterns.moments(channel_sum(basis))
+        shared = patterns.shared(basis, uniform_moments(extent))
         coefficient = patterns.coefficient(basis)
         channels: tuple[Moments, ...] = ()
         if per_channel:
@@ -96,6 +96,27 @@ class Moments:
             tuple(c.select(pixels) for c in self.channels),
         )
 
+    def spread(self, variances: NDArray, where: NDArray[np.bool_]) -> Moments:
+        """Give some of the pixels other variances.
+
+        Parameters
+        ----------
+        variances : (2, n) float
+            Along u and v. They are held within what a transport of the pixel's mean can have.
+        where : (n,) bool
+            The pixels that get them.
+
+        Returns
+        -------
+        Moments
+        """
+        out = self.normalised.copy()
+        for mean, square, variance in zip((U, V), (UU, VV), variances, strict=True):
+            middle = out[mean][where]
+            room = middle * (1 - middle)
+            out[square][where] = middle**2 + np.clip(variance[where], 0, room)
+        return replace(self, normalised=out)
+
     @property
     def uniform(self) -> NDArray[np.float64]:
         """(6,) float64: the normalised moments of a pixel that sees the whole patch evenly."""
@@ -120,20 +141,6 @@ class Moments:
         """(n,): the covariance of u and v."""
         mu, mv = self.mean
         return self.normalised[UV] - mu * mv
-
-
-def channel_sum(images: NDArray) -> NDArray[np.float64]:
-    """Sum over the channels. numpy's own sum is slow over an axis this short.
-
-    Parameters
-    ----------
-    images : (..., 3) float
-
-    Returns
-    -------
-    (...) float64
-    """
-    return images[..., 0].astype(np.float64) + images[..., 1] + images[..., 2]
 
 
 def normalise(moments: NDArray, extent: Extent) -> NDArray:

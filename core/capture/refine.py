@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from ..errors import HemicubeError
 from ..faces import FINEST, LEAF_SIDES, Leaf
 from ..hemicube import Hemicube
-from .moments import channel_sum
+from ..patterns import channel_sum
 
 # Cells (of 5.6 degrees) over which the correlation of light falls to 1/e.
 ALIKE = 3.0

@@ -55,6 +55,8 @@ class TileData:
         See `Around`.
     grain : (K, h, w) float32, optional
         The difference of two random halves of the light, summed over channels, see `names.GRAIN`.
+    together : bool
+        Whether all images of a patch are of one render.
     """
 
     region: Region
@@ -63,6 +65,7 @@ class TileData:
     alpha: NDArray[np.float32]
     guides: dict[str, NDArray[np.float32]]
     grain: NDArray[np.float32] | None = None
+    together: bool = True
 
     def images(self, k: int) -> NDArray[np.float32]:
         """Give the basis images of a patch.

@@ -20,7 +20,7 @@ from ..hemicube import Hemicube
 from ..measure import box_averages, box_of
 from ..patterns import UU, VV, U, V
 from ..region import Region
-from ..supports import BOX, LINEAR, WHOLE
+from ..supports import BELL, BOX, LINEAR, WHOLE
 from .tile_writer import TileWriter
 
 FACTORS = (2, 4, 8)
@@ -45,7 +45,7 @@ def proxies(tile: TileWriter, hemicube: Hemicube, first: bool = True) -> dict[in
         By how many pixels a side one pixel of the proxy covers.
     """
     found: dict[int, TileWriter] = {}
-    if not set(tile.models) <= {WHOLE.code, LINEAR.code, BOX.code}:
+    if not set(tile.models) <= {WHOLE.code, LINEAR.code, BOX.code, BELL.code}:
         return found
     last, y = tile, tile.region.y
     for factor in FACTORS:
@@ -123,12 +123,14 @@ def _merge(
     light = np.zeros((3, grid.half.pixels))
     # sums of R, all channels, times the mean place; and of the boxes' alone, with the squares
     places = np.zeros((2, grid.half.pixels))
-    boxes = np.zeros((5, grid.half.pixels if BOX.code in [code for code, *_ in entries] else 0))
+    # a bell has the moments of its box, but for what the patch's rim cuts
+    kinds = [code for code, *_ in entries if code in (BOX.code, BELL.code)]
+    boxes = np.zeros((5, grid.half.pixels if kinds else 0))
     for code, pixels, coefficient, parameters in entries:
         size = coefficient[0] + coefficient[1] + coefficient[2]
         for row, channel in zip(light, coefficient, strict=True):
             row += grid.total(pixels, channel)
-        if code == BOX.code:
+        if code in kinds:
             averages = box_averages(parameters.T / np.float64(65535), extent)
             u, v = averages[U], averages[V]
             for row, of in zip(boxes, (None, u, v, averages[UU], averages[VV]), strict=True):
@@ -149,4 +151,4 @@ def _merge(
     if len(narrow):
         _, u, v, uu, vv = boxes[:, narrow] / boxes[0, narrow]
         spread = np.maximum(uu - u * u, 0), np.maximum(vv - v * v, 0)
-        half.add_entries(BOX.code, narrow, light[:, narrow], box_of((u, v), spread, extent).T)
+        half.add_entries(kinds[0], narrow, light[:, narrow], box_of((u, v), spread, extent).T)

@@ -10,6 +10,9 @@ tells how many independent light paths an entry had, which decides how its momen
   by solid angle, to `CENTRED`. An uncertain mean is kept as it is, in the linear projection. That
   is unbiased noise, which averages out over pixels and can be denoised. A mean that is rounded to
   the middle stays wrong.
+- Where a pixel has too few paths to give evidence, its neighbours may give it: the spread within
+  each of them is pooled (`pooled`). Such a box has the middle of its own pixel and the width of the
+  pool.
 - A box with enough evidence may still be the worse filter. Reflection that is narrow both ways is
   a box. Reflection that is broad, or narrow one way only, is mostly a diffuse view of a patch that
   something hides in part. There the edge of a box lets a sun in or shuts it out by its last digit,
@@ -28,11 +31,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..capture.moments import Moments
-from ..errors import FieldError
-from ..measure import Extent
+from ..errors import FieldError, PatternError
+from ..measure import Extent, box_of
 from ..patterns import ONE, UU, VV, PatternSet, U, V
 from ..supports import BOX, LINEAR, NOTHING, PER_CHANNEL, SUPPORTS, WHOLE, Support
 from .evidence import Evidence
+from .pooled import pooled, weighed
 
 SEARCH = "search"
 STAGE_AND_MATTE = "stage_and_matte"
@@ -71,6 +75,16 @@ def check(choice: str, patterns: PatternSet, separate: bool = False) -> None:
             f"'{choice}' has one support for all channels: turn Per Channel off, or choose another "
             "support model"
         )
+    if separate and not patterns.grey:
+        raise PatternError(
+            f"the pattern set '{patterns.name}' has no supports of each channel's own: turn Per "
+            "Channel off, or capture with the pattern set 'moments_uv'"
+        )
+    if choice == SEARCH and not patterns.grey:
+        raise PatternError(
+            f"the support model '{choice}' needs patterns that are the same in all channels: "
+            "capture with the pattern set 'moments_uv', or choose another support model"
+        )
     if choice == SEARCH:
         patterns.require((ONE,), f"the support model '{choice}'")
     elif choice == "auto":
@@ -89,34 +103,116 @@ def _aicc(parameters: int, n: NDArray) -> NDArray:
     return np.where(np.isinf(n), 2 * parameters, np.where(few > 0, price, np.inf))
 
 
-def _smallest(moments: Moments, hits: NDArray) -> NDArray[np.uint8]:
-    """The codes (n,) of the smallest models that explain the moments of one patch.
+def _smallest(
+    moments: Moments, known: Evidence, k: int, pixels: NDArray[np.intp]
+) -> tuple[NDArray[np.uint8], Moments]:
+    """The codes (n,) of the smallest models that explain the moments of one patch, and the moments
+    with spreads that the neighbours tell as well.
 
     Moments without spreads (NaN) are never boxes.
     """
+    hits = known.hits(k, pixels)
     n = np.maximum(hits, 1e-9)
-    even = moments.uniform
-    offs = [mean - middle for mean, middle in zip(moments.mean, even[[U, V]], strict=True)]
+    even, means = moments.uniform, np.stack(moments.mean)
+    offs = means - even[[U, V]][:, None]
     spreads = even[[UU, VV]] - even[[U, V]] ** 2
     uncertain = np.sqrt(spreads.sum() / n)
-    centred = np.sqrt(offs[0] * offs[0] + offs[1] * offs[1]) + uncertain < CENTRED
+    centred = np.sqrt(np.square(offs).sum(axis=0)) + uncertain < CENTRED
     codes = np.where(centred, WHOLE.code, LINEAR.code).astype(np.uint8)
-    if np.isfinite(moments.variance).any():
-        codes[_shown_box(moments, offs, spreads, n)] = BOX.code
-    return codes
+    variances = np.stack(moments.variance)
+    if not np.isfinite(variances).any():
+        return codes, moments
+    grain = known.grain(k) if known.grain else None
+    if grain is not None:
+        grain = grain.ravel()[pixels]
+    box, moments = box_of_neighbours(
+        moments, hits, known.sizes[k, pixels], grain, pixels, known.shape
+    )
+    codes[box] = BOX.code
+    return codes, moments
+
+
+def box_of_neighbours(
+    moments: Moments,
+    hits: NDArray,
+    sizes: NDArray,
+    grain: NDArray | None,
+    pixels: NDArray[np.intp],
+    shape: tuple[int, int],
+    broad: float = BROAD,
+    surely: NDArray[np.bool_] | None = None,
+) -> tuple[NDArray[np.bool_], Moments]:
+    """Find the entries of one patch for which they and their neighbours show a box.
+
+    Parameters
+    ----------
+    moments : Moments
+        Of n entries.
+    hits : (n,) float
+        The numbers of equal light paths.
+    sizes : (n,) float
+        The coefficients, summed over channels.
+    grain : (n,) float, optional
+        Without grain each pixel is judged by itself.
+    pixels : (n,) int
+        Their numbers in the tile, row by row.
+    shape : tuple of int
+        (h, w) of the tile.
+    broad : float
+        The half width, of the patch, from which on no box is the better filter.
+    surely : (n,) bool, optional
+        The entries that are boxes whatever their spread is.
+
+    Returns
+    -------
+    box : (n,) bool
+    moments : Moments
+        With the spreads that show it.
+    """
+    n = np.maximum(hits, 1e-9)
+    means, variances = np.stack(moments.mean), np.stack(moments.variance)
+    even, extent = moments.uniform, moments.extent
+    if grain is None or not len(pixels):
+        box = _shown_box(means, variances, even, n, extent, broad)
+        return box if surely is None else box | surely, moments
+
+    def judged(some: NDArray[np.intp], alike: bool) -> tuple[NDArray, NDArray]:
+        pool = pooled(moments, sizes, grain, pixels, shape, some if alike else None)
+        of = weighed(moments.select(some), hits[some], pool)
+        more = np.maximum(n[some], pool.paths + 1)
+        return of, _shown_box(means[:, some], of, even, more, extent, broad)
+
+    variances, box = judged(np.arange(len(pixels)), False)
+    # what any neighbours make a box, those of about its own size must
+    asked = np.flatnonzero(box if surely is None else box | surely)
+    if len(asked):
+        variances[:, asked], box[asked] = judged(asked, True)
+    if surely is not None:
+        box |= surely
+    # the middle of n paths scatters about the support's by 1 / n of its variance, which is so much
+    # of a blur already: a box that is less wide by that is unbiased over pixels
+    variances = variances * (1 - 1 / np.maximum(n, 1))
+    return box, moments.spread(variances, box)
 
 
 def _shown_box(
-    moments: Moments, offs: list[NDArray], spreads: NDArray, n: NDArray
+    means: NDArray,
+    variances: NDArray,
+    even: NDArray,
+    n: NDArray,
+    extent: Extent,
+    broad: float = BROAD,
 ) -> NDArray[np.bool_]:
     """Where the evidence shows a box that is narrow enough to be the better filter -> (n,).
 
-    offs: the distances of the means from the whole patch's, along u and v; spreads: the variances
-    of the whole patch; n: the numbers of hits.
+    means, variances: (2, n) along u and v; even: (6,) moments of the whole patch; n: the numbers of
+    hits; broad: see `box_of_neighbours`.
     """
+    offs = means - even[[U, V]][:, None]
+    spreads = even[[UU, VV]] - even[[U, V]] ** 2
     spread_gain = np.zeros(len(n))
     widest = np.zeros(len(n))
-    for off, variance, even in zip(offs, moments.variance, spreads, strict=True):
+    for off, variance, even in zip(offs, variances, spreads, strict=True):
         # twice the gain in log likelihood per sample by a spread of its own, compared with the
         # spread of a linear density: the variance of the whole patch minus off^2
         expected = np.maximum(even - off * off, even / 4)
@@ -127,10 +223,12 @@ def _shown_box(
         box = np.where(np.isinf(n), True, n * spread_gain > _aicc(4, n) - _aicc(2, n))
     # the half width by the variance alone, which is right to `BENT`
     widest = np.sqrt(widest)
-    box &= widest < BROAD * (1 + BENT)
-    near = np.flatnonzero(box & (widest > BROAD * (1 - BENT)))
-    edges = BOX.fit(moments.select(near))
-    box[near] = np.maximum(edges[:, 1] - edges[:, 0], edges[:, 3] - edges[:, 2]) < 2 * BROAD
+    box &= widest < broad * (1 + BENT)
+    near = np.flatnonzero(box & (widest > broad * (1 - BENT)))
+    edges = box_of(
+        (means[0][near], means[1][near]), (variances[0][near], variances[1][near]), extent
+    )
+    box[near] = np.maximum(edges[:, 1] - edges[:, 0], edges[:, 3] - edges[:, 2]) < 2 * broad
     return box
 
 
@@ -230,7 +328,7 @@ def choose_lit(
     """
     moments = Moments.from_basis(basis, patterns, extent, separate)
     if choice == "auto":
-        codes = _smallest(moments, known.hits(k, pixels))
+        codes, moments = _smallest(moments, known, k, pixels)
     else:
         codes = np.full(len(pixels), SUPPORTS[choice].code, np.uint8)
     found: dict[int, NDArray] = {}

@@ -73,10 +73,42 @@ class Evidence:
         -------
         (m,) int
         """
-        size = self.sizes[k]
-        under_a_sun = np.float32(SUN * self.solid_angles[k] / np.pi) * self.total
+        return np.flatnonzero(self.kept_of(k, slice(None), self.sizes[k]))
+
+    def kept_of(self, k: int, pixels: NDArray[np.intp] | slice, size: NDArray) -> NDArray[np.bool_]:
+        """Say whether light of some size from a patch is kept as an entry.
+
+        Parameters
+        ----------
+        k : int
+        pixels : (m,) int or slice
+        size : (m,) float
+            The sum over channels.
+
+        Returns
+        -------
+        (m,) bool
+        """
+        under_a_sun = np.float32(SUN * self.solid_angles[k] / np.pi) * self.total[pixels]
         # one comparison: what is kept is the lesser of the two
-        return np.flatnonzero((size >= np.minimum(self.least, under_a_sun)) & (size > 0))
+        kept: NDArray[np.bool_] = size >= np.minimum(self.least[pixels], under_a_sun)
+        return kept & (size > 0)
+
+    def share_of(self, pixels: NDArray[np.intp], size: NDArray) -> NDArray:
+        """Compute how many light paths of a pixel some light has, if all paths are equal.
+
+        Parameters
+        ----------
+        pixels : (m,) int
+        size : (m,) float
+            The light, summed over channels.
+
+        Returns
+        -------
+        (m,) float
+        """
+        total = self.total[pixels]
+        return (self.samples or np.inf) * size / np.where(total > 0, total, 1)
 
     def hits(self, k: int, pixels: NDArray[np.intp]) -> NDArray:
         """Compute how many equal light paths would be as noisy as the paths from a patch to some
@@ -98,14 +130,18 @@ class Evidence:
         """
         if self.samples is None:
             return np.full(pixels.shape, np.inf)
-        size, total = self.sizes[k], self.total[pixels]
-        share = self.samples * size[pixels] / np.where(total > 0, total, 1)
+        size = self.sizes[k]
+        share = self.share_of(pixels, size[pixels])
         grain = self.grain(k) if self.grain else None
         if grain is None:
             return share
-        squares = _window_sum(np.square(grain, dtype=np.float64))
-        signal = _window_sum(np.square(size, dtype=np.float64).reshape(self.shape))
-        found = (signal / np.maximum(squares, 1e-300)).ravel()[pixels]
+        # NaN where the channel that shows the grain has no light
+        told = np.isfinite(grain)
+        squares = _window_sum(np.where(told, np.square(grain, dtype=np.float64), 0))
+        signal = np.square(size, dtype=np.float64).reshape(self.shape)
+        signal = _window_sum(np.where(told, signal, 0)).ravel()[pixels]
+        found = signal / np.maximum(squares.ravel()[pixels], 1e-300)
+        found = np.where(signal > 0, found, share)
         # a few grains may cancel by chance, and a path cannot be more than one sample
         return np.minimum(found, 2 * share + 1)
 

@@ -35,10 +35,11 @@ from ..field.about import About
 from ..field.tile_writer import TileWriter
 from ..field.writer import FieldWriter, write_tile
 from ..hemicube import Hemicube
-from ..patterns import PatternSet
+from ..patterns import LobedSet, PatternSet
 from ..supports import BOX, NOTHING, WHOLE
 from . import choice as choices
 from .evidence import evidence
+from .lobes import choose_lobes, write_lobes
 from .search import search
 
 # The approximate share of the first pass over the images in the work on a tile.
@@ -84,8 +85,12 @@ def fit_tile(
     shape = (data.region.height, data.region.width)
     sizes = np.empty((patches, data.region.pixels), np.float32)
     ones = np.ones(3, np.float32)
+    lobed = patterns if isinstance(patterns, LobedSet) and choice == "auto" else None
+    sharp = np.zeros(data.region.pixels, np.float32)
 
     def look(k: int, images: NDArray) -> None:
+        if lobed:
+            sharp[...] += np.matmul(images[lobed.base].reshape(-1, 3), ones)
         # a product, which adds over so short an axis several times as fast as a sum
         np.matmul(patterns.coefficient(images).reshape(-1, 3), ones, out=sizes[k])
 
@@ -104,6 +109,12 @@ def fit_tile(
             # of most pixels a patch only has the coefficient looked at
             coefficient = data.coefficient(k, patterns).reshape(-1, 3)
             lit = choices.entries(choice, coefficient, known, k)
+            if lobed:
+                images, share = data.images_at(k, lit), sharp / np.maximum(known.total, 1e-30)
+                found = choose_lobes(images, lobed, known, k, lit, extent, data.together, share)
+                write_lobes(writer, coefficient, lit, found)
+                yield READING + (1 - READING) * (k + 1) / patches
+                continue
             codes = np.full(len(coefficient), NOTHING, np.uint8)
             codes[lit], parameters = choices.choose_lit(
                 choice, data.images_at(k, lit), patterns, known, k, lit, extent, separate

@@ -241,6 +241,31 @@ class PatchLight:
         total += self._sum_to(k, i0, j0)
         return total[:, :3] / total[:, 3:]
 
+    def point(self, k: int, u: NDArray, v: NDArray) -> NDArray[np.float64]:
+        """Average the light of a patch over boxes that are no wider than a bin, see `box`.
+
+        Parameters
+        ----------
+        k : int
+        u, v : (n,) float
+            The middles of the boxes, in patch coordinates.
+
+        Returns
+        -------
+        (n, 3) float64
+            Scene-linear radiance.
+        """
+        r = int(self.resolutions[k])
+        i, fi = _between(bin_coordinate(self.hemicube, k, u, 0, r), r)
+        j, fj = _between(bin_coordinate(self.hemicube, k, v, 1, r), r)
+        flat = self._flat[self._offsets[k] : self._offsets[k + 1]]
+        at, right, up = j * r + i, min(1, r - 1), r * min(1, r - 1)
+        total: NDArray[np.float64] = flat[at] * ((1 - fi) * (1 - fj))[:, None]
+        total += flat[at + right] * (fi * (1 - fj))[:, None]
+        total += flat[at + up] * ((1 - fi) * fj)[:, None]
+        total += flat[at + up + right] * (fi * fj)[:, None]
+        return total[:, :3] / total[:, 3:]
+
     def _sum_to(self, k: int | NDArray, i: NDArray, j: NDArray) -> NDArray[np.float64]:
         """Look up the table between its entries: bilinear, which is exact for light constant in a
         bin.
@@ -280,6 +305,14 @@ def _turned(samples: NDArray, turn: float) -> NDArray:
 def _starts(sizes: NDArray) -> NDArray[np.intp]:
     """Where each of some runs begins, and where the last one ends, (K + 1,)."""
     return np.concatenate([[0], np.cumsum(sizes)]).astype(np.intp)
+
+
+def _between(at: NDArray, r: int) -> tuple[NDArray[np.intp], NDArray]:
+    """The lower of the two bins that a bin's width about a coordinate meets, and how much of it is
+    in the other."""
+    at = np.clip(at - 0.5, 0, r - 1)
+    low = np.minimum(at.astype(np.intp), max(r - 2, 0))
+    return low, at - low
 
 
 def _at_least_one_bin(low: NDArray, high: NDArray, r: NDArray | int) -> tuple[NDArray, NDArray]:

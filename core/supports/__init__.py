@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .base import Support
+from .bell import Bell
 from .box import Box
 from .double import Double
 from .linear import Linear
@@ -11,9 +12,9 @@ from .quadratic import Quadratic
 from .tilted import Gaussian, OrientedBox
 from .whole import Whole
 
-WHOLE, LINEAR, BOX = Whole(), Linear(), Box()
+WHOLE, LINEAR, BOX, BELL = Whole(), Linear(), Box(), Bell()
 SUPPORTS: dict[str, Support] = {
-    s.name: s for s in (WHOLE, LINEAR, BOX, Quadratic(), OrientedBox(), Gaussian(), Double())
+    s.name: s for s in (WHOLE, LINEAR, BOX, Quadratic(), OrientedBox(), Gaussian(), Double(), BELL)
 }
 PER_CHANNEL: dict[str, Support] = {s.name: PerChannel(s) for s in SUPPORTS.values() if s.parameters}
 BY_CODE: dict[int, Support] = {s.code: s for s in (*SUPPORTS.values(), *PER_CHANNEL.values())}
@@ -21,6 +22,7 @@ BY_CODE: dict[int, Support] = {s.code: s for s in (*SUPPORTS.values(), *PER_CHAN
 NOTHING, REST = 0, 255
 
 __all__ = [
+    "BELL",
     "BOX",
     "BY_CODE",
     "LINEAR",

@@ -81,7 +81,14 @@ def _planted(
     extent: tuple[float, ...] = FLAT,
 ) -> NDArray:
     """Basis images (P, n, 3) of even boxes (n, 4: u0, u1, v0, v1) with R (n, 3)."""
-    return (patterns.matrix @ _box_moments(boxes, extent))[..., None] * coefficient
+    found = _box_moments(boxes, extent)
+    # by channel; half of the grains are lit
+    shown = [
+        [np.array((0.5, 0, 0, 0, 0, 0)) if row is None else np.array(row) for row in rows]
+        for rows in map(patterns.emission, patterns.patterns)
+    ]
+    each = [[row @ found for row in (rows if len(rows) == 3 else 3 * rows)] for rows in shown]
+    return np.moveaxis(np.array(each), 1, -1) * coefficient
 
 
 def _hits(patterns: PatternSet, u: NDArray, v: NDArray, weights: NDArray) -> NDArray:

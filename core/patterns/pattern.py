@@ -5,8 +5,14 @@ coefficients over `MONOMIALS`. The basis image of a pattern is the same combinat
 of the light's path from patch to pixel. So a set of patterns is described by its matrix, and the
 moments that it can tell are those in the row space of the matrix (docs/identifiability.md).
 
+A pattern may also show another polynomial in each colour channel (`packed`). A moment is then the
+ratio of its image to the white image in the moment's own channel, where the colour of what reflects
+cancels. So three patterns hold all six moments, at the price of three layers that a light path
+crosses.
+
 Examples
 --------
+>>> from arto.core.patterns import pattern_set
 >>> paper = pattern_set("paper")
 >>> len(paper), paper.rank
 (9, 5)
@@ -22,7 +28,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import PatternError
+from ..errors import PatternError
 
 MONOMIALS = ("1", "u", "u2", "v", "v2", "uv")
 ONE, U, UU, V, VV, UV = range(6)
@@ -43,6 +49,15 @@ def monomials(u: NDArray, v: NDArray) -> NDArray:
     """
     u, v = np.broadcast_arrays(u, v)
     return np.stack([np.ones_like(u), u, u * u, v, v * v, u * v])
+
+
+# Which light paths see a pattern, by what they left last on their way from the camera: a diffuse
+# surface or a volume, or one that reflects or refracts.
+PATHS = ALL, BASE, SHARP = "all", "base", "sharp"
+
+
+# Every pattern set by its name: `sets` fills it.
+PATTERN_SETS: dict[str, PatternSet] = {}
 
 
 @dataclass(frozen=True)
@@ -87,15 +102,41 @@ class PatternSet:
         """
         return np.tensordot(self.matrix, monomials(u, v), axes=1)
 
+    @property
+    def grey(self) -> bool:
+        """Whether every pattern shows the same in all channels."""
+        return True
+
+    def emission(self, pattern: str) -> tuple[tuple[float, ...] | None, ...]:
+        """Say what each channel of a pattern emits.
+
+        Parameters
+        ----------
+        pattern : str
+            Its name.
+
+        Returns
+        -------
+        tuple
+            For each channel the coefficients over `MONOMIALS`, or None where the channel shows
+            grains (`names.GRAIN`). One for all channels where they are the same.
+        """
+        return (self.coefficients[self.patterns.index(pattern)],)
+
+    @cached_property
+    def rows(self) -> NDArray[np.float64]:
+        """(r, 6) float64: every polynomial that some channel of some pattern shows."""
+        return self.matrix
+
     @cached_property
     def rank(self) -> int:
         """The number of independent combinations of moments that the set measures."""
-        return int(np.linalg.matrix_rank(self.matrix))
+        return int(np.linalg.matrix_rank(self.rows))
 
     @cached_property
     def condition(self) -> float:
         """Largest over smallest non-zero singular value: how far the set amplifies noise."""
-        s = np.linalg.svd(self.matrix, compute_uv=False)[: self.rank]
+        s = np.linalg.svd(self.rows, compute_uv=False)[: self.rank]
         return float(s[0] / s[-1])
 
     def sees(self, functional: NDArray | tuple[float, ...]) -> bool:
@@ -111,12 +152,12 @@ class PatternSet:
         bool
         """
         f = np.asarray(functional, np.float64)
-        projected = self._pseudo_inverse @ self.matrix
+        projected = self._pseudo_inverse @ self.rows
         return bool(np.allclose(f @ projected, f, atol=1e-9))
 
     @cached_property
     def _pseudo_inverse(self) -> NDArray[np.float64]:
-        return np.linalg.pinv(self.matrix, rcond=1e-10)
+        return np.linalg.pinv(self.rows, rcond=1e-10)
 
     @cached_property
     def identified(self) -> tuple[bool, ...]:
@@ -171,18 +212,36 @@ class PatternSet:
         """
         self.require((ONE,), "a reflection coefficient")
         if self.shown_by is not None:
-            return basis[self.shown_by]
+            first, *others = self.shown_by
+            total = basis[first]
+            for p in others:
+                total = total + basis[p]
+            return total
         return np.tensordot(self._pseudo_inverse[ONE].astype(basis.dtype), basis, axes=1)
 
     @cached_property
-    def shown_by(self) -> int | None:
-        """The number of the pattern whose basis image is the reflection coefficient itself.
+    def shown_by(self) -> tuple[int, ...] | None:
+        """The numbers of the patterns whose basis images add up to the reflection coefficient.
 
-        None where the coefficient is a combination of several basis images.
+        None where the coefficient is another combination of basis images.
         """
         row = self._pseudo_inverse[ONE]
         only = row[0] == 1 and not np.abs(row[1:]).max(initial=0) > 1e-12
-        return 0 if only and self.identified[ONE] else None
+        return (0,) if only and self.identified[ONE] else None
+
+    def paths(self, pattern: str) -> str:
+        """Say which light paths see a pattern.
+
+        Parameters
+        ----------
+        pattern : str
+
+        Returns
+        -------
+        str
+            One of `PATHS`.
+        """
+        return ALL
 
     def moments(self, basis: NDArray) -> NDArray:
         """Compute the moments from basis images.
@@ -222,41 +281,55 @@ class PatternSet:
                 moment += basis[p] * row[p]
         return out
 
+    def shared(self, basis: NDArray, even: NDArray) -> NDArray[np.float64]:
+        """Compute the moments that the channels share.
 
-def _gradient(degrees: int) -> tuple[float, ...]:
-    """The paper's quadratic gradient: the square of a ramp from 0 to 1 along a diagonal."""
-    su, sv = {45: (1, 1), 135: (-1, 1), 225: (-1, -1), 315: (1, -1)}[degrees]
-    # ramp = c + su u / 2 + sv v / 2, with c such that it runs from 0 to 1 over the patch
-    c = (2 - su - sv) / 4
-    return (c * c, c * su, 0.25, c * sv, 0.25, su * sv / 2)
+        Parameters
+        ----------
+        basis : (P, n, 3) float
+            Basis images, scene-linear radiance.
+        even : (6,) float
+            The normalised moments of the whole patch, for what the images do not tell.
+
+        Returns
+        -------
+        (6, n) float64
+            The moments of the sum over channels; NaN for what the set does not identify.
+
+        Source
+        ------
+        Paper 5: the channels share a support.
+        """
+        return self.moments(channel_sum(basis))
+
+    def grains(self, basis: NDArray) -> NDArray | None:
+        """Compute the difference of two random halves of the light, summed over channels.
+
+        Parameters
+        ----------
+        basis : (P, ..., 3) float
+
+        Returns
+        -------
+        (...) float or None
+            None where no pattern of the set shows grains. NaN where the channel of the grains has
+            no light.
+        """
+        return None
 
 
-def _paper() -> PatternSet:
-    white = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    names, rows = ["white"], [white]
-    for degrees in (45, 135, 225, 315):
-        row = _gradient(degrees)
-        names += [f"gradient{degrees}", f"inverse{degrees}"]
-        rows += [row, tuple(w - r for w, r in zip(white, row, strict=True))]
-    return PatternSet("paper", tuple(names), tuple(rows))
+def channel_sum(images: NDArray) -> NDArray[np.float64]:
+    """Sum images over their channels. numpy's own sum is slow over so short an axis.
 
+    Parameters
+    ----------
+    images : (..., 3) float
 
-def _monomial_set(name: str, *which: int) -> PatternSet:
-    eye = np.eye(6)
-    rows = tuple(tuple(float(x) for x in eye[m]) for m in which)
-    return PatternSet(name, tuple(("white", "u", "u2", "v", "v2", "uv")[m] for m in which), rows)
-
-
-PATTERN_SETS: dict[str, PatternSet] = {
-    s.name: s
-    for s in (
-        _monomial_set("moments", ONE, U, UU, V, VV),
-        _monomial_set("moments_uv", ONE, U, UU, V, VV, UV),
-        _monomial_set("linear", ONE, U, V),
-        _paper(),
-        _monomial_set("white", ONE),
-    )
-}
+    Returns
+    -------
+    (...) float64
+    """
+    return images[..., 0].astype(np.float64) + images[..., 1] + images[..., 2]
 
 
 def pattern_set(name: str) -> PatternSet:
