@@ -320,11 +320,32 @@ def remove_leftovers(path: Path) -> None:
     ----------
     path : Path
     """
-    form = re.compile(
-        re.escape(cut(path.name)) + r"\.([0-9a-f]{8})-(\d{1,10})-[0-9a-f]{16}" + re.escape(PART)
-    )
+    _remove_left(path.parent, re.compile(re.escape(cut(path.name)) + _UNIQUE))
+
+
+def sweep(folder: Path) -> None:
+    """Remove what killed processes have left in a folder of ARTO's, see `remove_leftovers`.
+
+    Parameters
+    ----------
+    folder : Path
+        A folder of somebody else stays as it is, and so do the folders in it.
+    """
+    if not is_ours(folder):
+        return
+    _remove_left(folder, re.compile(".+" + _UNIQUE))
     with contextlib.suppress(OSError):
-        for there in path.parent.iterdir():
+        for there in [path for path in folder.iterdir() if path.is_dir()]:
+            sweep(there)
+
+
+# How the names end that `unique` makes: the machine, the process and a random number.
+_UNIQUE = r"\.([0-9a-f]{8})-(\d{1,10})-[0-9a-f]{16}" + re.escape(PART)
+
+
+def _remove_left(folder: Path, form: re.Pattern[str]) -> None:
+    with contextlib.suppress(OSError):
+        for there in folder.iterdir():
             if not (found := form.fullmatch(there.name)):
                 continue
             here = found[1] == host()

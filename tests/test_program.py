@@ -289,7 +289,7 @@ def test_interrupted_in_batch(program: Program, scene: Path) -> None:
     for _ in range(20):
         os.killpg(running.pid, signal.SIGINT)
         try:
-            running.wait(5)
+            running.wait(20)
             break
         except subprocess.TimeoutExpired:
             continue

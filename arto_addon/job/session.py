@@ -142,6 +142,10 @@ class SecondBlender:
             log.close()
         self.lock.__exit__(None, None, None)
         marked.remove_quietly(self.folder, "job", self.folder.parent)
+        if self.told:
+            # a job that could not end by itself in time was killed in the middle of a file
+            for there in [path for path in self.folder.parent.iterdir() if path.is_dir()]:
+                marked.sweep(there)
 
     @property
     def spent(self) -> float:

@@ -27,7 +27,9 @@ def latest(
     if now:
         prints.forget()  # Without a window, no handler has noted what changed.
         return prints.fingerprint(scene, view_layer, then)
-    if key not in _asked or _asked[key] is not then:
+    # By value: an equal fingerprint that was read anew is no reason to look again. Each look
+    # redraws the panels, and the panels ask here.
+    if _asked.get(key) != then:
         _asked[key] = then
         _stale.add(key)
         _look_soon()

@@ -10,7 +10,7 @@ import time
 import bpy
 from arto.arto_addon import work
 from arto.arto_addon.fit import fit
-from arto.arto_addon.shot import paths, status
+from arto.arto_addon.shot import paths, status, watch
 from scene_tools import captured, small_scene
 
 
@@ -80,3 +80,12 @@ def test_a_file_that_was_never_saved(tmp_path):
     scene = bpy.context.scene
     scene.arto.folder = "//arto/"
     assert status.capture_line(scene) is None and status.field_line(scene) is None
+
+
+def test_an_equal_fingerprint_is_not_looked_at_again(tmp_path):
+    """Each look redraws the panels, and each panel asks: a look for every question has no end."""
+    scene = small_scene(tmp_path)
+    for then, stale in (("a", True), ("a", False), ("b", True)):
+        watch._stale.clear()
+        watch.latest(scene, "ViewLayer", {"Object 'Floor'": then}, now=False)
+        assert bool(watch._stale) == stale

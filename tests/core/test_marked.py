@@ -20,7 +20,7 @@ from arto.core.field.writer import FieldWriter
 from arto.core.files import Lock, replace_folder, settle, whole, write_text
 from arto.core.hemicube import Hemicube
 from arto.core.patterns import pattern_set
-from arto.core.regular import read_regular
+from arto.core.regular import host, read_regular
 
 needs_links = pytest.mark.skipif(os.name == "nt", reason="links need rights there")
 
@@ -255,3 +255,24 @@ def test_only_regular_files_of_a_size_are_read(tmp_path: Path) -> None:
             read_regular(tmp_path / name, 100, follow=name == "zero")
     assert time.monotonic() - begun < 1
     assert read_regular(tmp_path / "good", 100) == b'{"a": 1}'
+
+
+def test_a_sweep_removes_what_dead_processes_left_and_nothing_else(tmp_path: Path) -> None:
+    ours = marked.make(tmp_path / "shot", "take")
+    deeper = marked.make(ours / "unfinished", "take")
+    theirs = tmp_path / "shot" / "theirs"
+    theirs.mkdir()
+    done = subprocess.Popen([sys.executable, "-c", ""])
+    done.wait()
+    dead = f"tile_0000.exr.{host()}-{done.pid}-0123456789abcdef.part"
+    alive = f"tile_0000.exr.{host()}-{os.getpid()}-0123456789abcdef.part"
+    for folder in (ours, deeper, theirs):
+        for name in (dead, alive, "mine.part", "tile_0001.exr"):
+            (folder / name).write_text("x")
+    marked.sweep(ours)
+    for folder in (ours, deeper):
+        left = {path.name for path in folder.iterdir() if path.is_file()} - {marked.MARK}
+        assert left == {alive, "mine.part", "tile_0001.exr"}
+    assert (theirs / dead).exists()
+    marked.sweep(tmp_path)
+    assert (theirs / dead).exists()
