@@ -41,14 +41,16 @@ def kept(folder: Path) -> bool:
 
 
 JOB = """
-import signal, sys, time, arto
+import os, signal, sys, time, arto
 signal.signal(signal.SIGINT, signal.SIG_IGN)  # as in the program, where a render ends by it
 from pathlib import Path
 arto.register()
 from arto.arto_addon.job import run
 read = run.Task.read
 run.Task.read = lambda path: (time.sleep(0.5), read(path))[1]  # until it has looked at its input
-sys.exit(run.main(Path(sys.argv[1])))
+code = run.main(Path(sys.argv[1]))
+sys.stdout.flush()
+os._exit(code)  # Blender 4.5 as a module may crash where Python ends
 """
 
 
