@@ -285,11 +285,12 @@ def test_interrupted_in_batch(program: Program, scene: Path) -> None:
         printed += text
         if "render 1 of" in text:
             break
-    # Blender forgets a signal that comes before its render has begun: once more then
-    for _ in range(20):
+    # Blender forgets a signal that comes before its render has begun: once more then. A second one
+    # while it renders kills it, and a render only looks between two batches of samples.
+    for _ in range(5):
         os.killpg(running.pid, signal.SIGINT)
         try:
-            running.wait(20)
+            running.wait(60)
             break
         except subprocess.TimeoutExpired:
             continue
