@@ -293,7 +293,9 @@ def lit(
         on.scene.collection.children.link(collection)
         build(collection, hemicube, patterns, images, note, free_mark(), sampled)
         planes = list(collection.objects)
-        _threshold(collection, hemicube, note)
+        if len(patterns) > 1:
+            # One pattern alone has no ratios to keep, and the coin after it costs it no noise.
+            _threshold(collection, hemicube, note)
         # the artist's groups come first: their lamps are sampled, and of the groups of sampled
         # lights Cycles can only tell the first apart
         for name in on.own_groups if own else ():
