@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 from arto.arto_addon import shoot, work
 from arto.arto_addon.live import live
-from arto.arto_addon.shot import paths
+from arto.arto_addon.plate.names import relit_file
 from arto.core import exr
 
 from . import scenes, worlds
@@ -150,7 +150,7 @@ def difference(scene: bpy.types.Scene) -> float:
     from arto.arto_addon.relight.relight import compute
 
     work.run(compute(scene, scene.view_layers[0].name))
-    plate = next(iter(exr.read(paths.relit_file(scene)).values()))
+    plate = next(iter(exr.read(relit_file(scene)).values()))
     hand = _Hand(scene)
     try:
         hand.rest()

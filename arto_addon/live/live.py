@@ -26,10 +26,11 @@ from ...core.region import Region
 from ..blender.pictures import put
 from ..blender.quitting import not_when_quitting, when_quitting
 from ..job import session
+from ..plate.names import relit_file
 from ..plate.plate import name_of
 from ..relight.light_key import HEADER, light_key
 from ..relight.shown import Shown
-from ..shot import paths, watch
+from ..shot import watch
 from ..shot.shot import check_same_shot, layer_of
 from ..stage.stage import picture_size
 from ..world.background import holds_out
@@ -210,7 +211,7 @@ class Live:
     def _is_finished(self, scene: bpy.types.Scene) -> bool:
         """Whether the plate on disk is already of this light and this field."""
         try:
-            path = paths.relit_file(scene)
+            path = relit_file(scene)
             world = check_world(scene, self.layer)
             same = exr.header(path).get(HEADER) == light_key(scene, world)
             return same and path.stat().st_mtime_ns >= self.written

@@ -13,7 +13,7 @@ from ...core import exr
 from ...core.errors import SceneError
 from ..blender.output import float_exr
 from ..blender.pictures import put
-from ..shot import paths
+from .names import relit_file
 
 IMAGE = "ARTO Compare"
 # Plate and render by the scene's `session_uid`, kept so that moving the wipe reads no files.
@@ -25,7 +25,7 @@ def begin(scene: bpy.types.Scene) -> bpy.types.Image:
 
     Raises SceneError where there is no plate or no render, or where their sizes differ.
     """
-    path = paths.relit_file(scene)
+    path = relit_file(scene)
     if not path.is_file():
         raise SceneError("there is no plate to compare: press Relight first")
     plate = next(iter(exr.read(path).values()))

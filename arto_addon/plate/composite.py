@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ...core.errors import SceneError
 from ..blender.compositing import OUTPUT, composited, compositor, own_compositor
 from ..blender.pictures import put
-from ..shot import paths
 from ..work import Progress, Steps
+from .names import relit_file
 
 COMPOSITE = "ARTO Composite"
 
@@ -22,7 +22,7 @@ def composite_file(scene: bpy.types.Scene) -> Path:
 
     Raises SceneError where the plate has no path.
     """
-    plate = paths.relit_file(scene)
+    plate = relit_file(scene)
     return plate.with_name(f"{plate.stem}_composite{scene.render.file_extension}")
 
 

@@ -16,8 +16,9 @@ from ...core.exr.window import NO_HIT, Window
 from ...core.field.field import Field
 from ..blender.colour import working_space
 from ..blender.compositing import mixed
-from ..shot import home, paths
+from ..shot import home
 from .header import header
+from .names import relit_name
 
 IMAGE = "ARTO Relit"
 # The image node in a plate's group.
@@ -149,7 +150,7 @@ def comp_file(path: Path) -> Path:
 
 def name_of(scene: bpy.types.Scene, look: str | None = None) -> str:
     """The name of the plate's image and node group, which no other scene or look has."""
-    name = paths.relit_name(scene, look)
+    name = relit_name(scene, look)
     return f"ARTO {name}" if name else IMAGE
 
 

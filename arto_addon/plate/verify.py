@@ -20,6 +20,7 @@ from ..stage.stage import stage
 from ..work import Progress, Steps
 from ..world.own import gains_of
 from . import plate
+from .names import relit_file
 
 # Samples of each of the two renders.
 SAMPLES = 16
@@ -38,7 +39,7 @@ def verify_plate(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps
     size differs from a render's, or where pixels are not finite; CancelledError.
     """
     layer = view_layer or layer_of(scene)
-    path = paths.relit_file(scene)
+    path = relit_file(scene)
     if not path.is_file():
         raise SceneError(f"there is no plate {path} to verify: press Relight first")
     there = next(iter(exr.read(path).values()))

@@ -18,8 +18,8 @@ from ..blender.colour import working_space
 from ..blender.compositing import compositor
 from ..blender.nodes import new_world
 from ..plate.mixer import EXPOSURE_SOCKET, SOURCE
+from ..plate.names import relit_file
 from ..plate.plate import layers_file, shown_file, world_file
-from ..shot import paths
 from ..shot.shot import layer_of
 from ..world import kept
 from ..world.check import check_world
@@ -78,7 +78,7 @@ def mix_to_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> Path:
     mix, settings = mix_of(scene), scene.arto
     shown = Shown(scene, layer)
     world = check_world(scene, layer)
-    path = paths.relit_file(scene)
+    path = relit_file(scene)
     lit = exr.header(shown_file(layers_file(path), exr.header(path))).get("arto.world")
     if lit != world.name:
         raise SceneError(

@@ -24,6 +24,7 @@ from ...core.light.light import PatchLight
 from ...core.relight import relights, together
 from ...core.shot import safe_name
 from ..blender import denoise
+from ..plate.names import relit_file
 from ..plate.plate import (
     comp_file,
     data_file,
@@ -35,7 +36,6 @@ from ..plate.plate import (
     window_of,
     world_file,
 )
-from ..shot import paths
 from ..work import Progress, Steps
 from ..world import kept
 from ..world.lamp_render import lamp_light, lamp_samples
@@ -186,7 +186,7 @@ def write(
         exr.write_layered(together, picture, named, attributes, space, window)
     # the mixer reads all layers and all their pixels from one file
     whole = shown_file(together, attributes)
-    if window.crop if not each else path == paths.relit_file(scene):
+    if window.crop if not each else path == relit_file(scene):
         full = replace(window, crop=False)
         exr.write_layered(whole, picture, named, attributes, space, full)
     yield Progress(0.95, f"layers: {', '.join(named)}; their sum is off by {off:.1e} at most")

@@ -9,8 +9,8 @@ import bpy
 
 from ...core.errors import SceneError
 from ...core.relight import together
+from ..plate.names import relit_file
 from ..plate.present import present
-from ..shot import paths
 from ..shot.shot import check_same_shot, layer_of
 from ..work import Progress, Steps
 from ..world.check import world_of
@@ -106,7 +106,7 @@ def relight_looks(scene: bpy.types.Scene, view_layer: str) -> Steps:
         ready: list[Ready] = []
         for look in looks[first : first + most]:
             share = (len(done) + len(ready)) / len(looks)
-            path = paths.relit_file(scene, look.name)
+            path = relit_file(scene, look.name)
             yield Progress(share, f"look {len(done) + len(ready) + 1} of {len(looks)}: {look.name}")
             ready.append((yield from make_ready(shown, Light(path, look.name, look.world))))
         pictures = shown.pictures([r.light for r in ready])

@@ -18,6 +18,7 @@ from ...core.relight import together
 from ...core.shot import safe_name
 from ..blender.nodes import new_world
 from ..capture.sequence import frame_kept
+from ..plate.names import numbers_frames, relit_file
 from ..plate.present import present_frames
 from ..shot import paths
 from ..shot.shot import check_same_shot, shot_of
@@ -60,8 +61,8 @@ def relight_many(
                 still = _shown(scene, view_layer, still)
             assert still is not None
             # worked out at each frame: the path may contain the frame's number
-            base = paths.relit_file(scene)
-            numbered = frames and paths.numbers_frames(scene)
+            base = relit_file(scene)
+            numbered = frames and numbers_frames(scene)
             every = [(file, turn) for file in worlds or [None] for turn in range(turns)]
             most = max(1, together(still.field) // len(still.takes))
             for first in range(0, len(every), most):

@@ -17,8 +17,8 @@ from ...core.region import Region
 from ...core.relight import over
 from ..blender import denoise
 from ..plate import plate
+from ..plate.names import relit_file
 from ..plate.present import present
-from ..shot import paths
 from ..shot.shot import check_same_shot, layer_of
 from ..work import Progress, Steps
 from ..world import kept
@@ -61,7 +61,7 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     layer = view_layer or layer_of(scene)
     check_world(scene, layer)
     scene.view_layers[layer].update()
-    path = paths.relit_file(scene)
+    path = relit_file(scene)
     shown = Shown(scene, layer)
     check_same_shot(scene, shown.field.about.shot, "the reflectance field", layer)
     seconds = yield from show(shown, Light(path, scene.arto.look))

@@ -10,10 +10,11 @@ from ...core import exr
 from ...core.errors import ArtoError
 from ..blender.compositing import compositor
 from ..live import live
+from ..plate.names import relit_file
 from ..plate.plate import name_of
 from ..plate.present import MIX
 from ..relight.layers import prefix_of
-from ..shot import paths, status
+from ..shot import status
 from ..world import controls, dials
 from ..world.check import world_of
 from . import thumbnails
@@ -91,7 +92,7 @@ def _live(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
 def lamps_line(scene: bpy.types.Scene) -> str:
     """What the last plate's header says of the HDRI's suns."""
     try:
-        header = exr.header(paths.relit_file(scene))
+        header = exr.header(relit_file(scene))
     except (ArtoError, OSError):
         return ""
     found = str(header.get("arto.lamps", ""))
@@ -146,7 +147,7 @@ class ARTO_UL_looks(bpy.types.UIList):
     ) -> None:
         icon = 0
         with contextlib.suppress(ArtoError):  # a file that was never saved has no place for plates
-            icon = thumbnails.of_plate(paths.relit_file(context.scene, item.name))
+            icon = thumbnails.of_plate(relit_file(context.scene, item.name))
         row = layout.row(align=True)
         if icon:
             row.template_icon(icon, scale=1.0)

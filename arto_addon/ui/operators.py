@@ -18,6 +18,7 @@ from ..capture.planned import guess
 from ..capture.sequence import capture_frames
 from ..fit.fit import fit
 from ..job import session
+from ..plate.names import relit_file
 from ..relight.back import mix_to_scene
 from ..relight.many import frames_of, relight_frames
 from ..relight.relight import relight
@@ -163,7 +164,7 @@ class ARTO_OT_relight(LongWork):
 
     def check(self, scene: bpy.types.Scene) -> None:
         check_world(scene)
-        paths.relit_file(scene)
+        relit_file(scene)
 
     def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
         return relight(scene, view_layer)
@@ -204,7 +205,7 @@ whose frames were captured, or of an animated world over a still"""
 
     def check(self, scene: bpy.types.Scene) -> None:
         check_world(scene)
-        paths.relit_file(scene)
+        relit_file(scene)
 
     def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
         return relight_frames(scene, view_layer, frames_of(scene))

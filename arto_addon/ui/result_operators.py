@@ -10,9 +10,9 @@ from ...core import exr
 from ...core.errors import SceneError
 from ..plate import compare
 from ..plate.composite import save_composite
+from ..plate.names import relit_file
 from ..plate.plate import name_of, show, shown_file
 from ..plate.verify import verify_plate
-from ..shot import paths
 from ..work import Steps
 from .long_work import LongWork
 from .operators import Quick, free
@@ -21,7 +21,7 @@ from .reveal import reveal
 
 def _has_plate(cls: type, context: bpy.types.Context) -> bool:
     try:
-        path: Path | None = paths.relit_file(context.scene)
+        path: Path | None = relit_file(context.scene)
     except SceneError as e:
         cls.poll_message_set(str(e))
         return False
@@ -43,7 +43,7 @@ class ARTO_OT_show_plate(Quick):
 
     def work(self, context: bpy.types.Context) -> str:
         scene = context.scene
-        path = paths.relit_file(scene)
+        path = relit_file(scene)
         image = bpy.data.images.get(name_of(scene))
         if image is None:
             image = show(shown_file(path, exr.header(path)), name_of(scene))

@@ -10,6 +10,7 @@ import bpy
 from ...core import exr
 from ...core.errors import ArtoError
 from ..job import session
+from ..plate.names import relit_file
 from ..plate.verify import verify_file
 from ..relight.light_key import HEADER, light_key
 from ..shot import paths, status
@@ -48,7 +49,7 @@ def plate_line(scene: bpy.types.Scene) -> tuple[str, bool]:
 
 def _plate_line(scene: bpy.types.Scene) -> tuple[str, bool]:
     try:
-        path = paths.relit_file(scene)
+        path = relit_file(scene)
         header = header_of(path)
         written = path.stat().st_mtime
         world = world_of(scene)
@@ -78,7 +79,7 @@ class Result(Draws):
         scene, settings = context.scene, context.scene.arto
         text, good = plate_line(scene)
         try:
-            path: Path | None = paths.relit_file(scene)
+            path: Path | None = relit_file(scene)
         except ArtoError:
             path = None
         if text and path:

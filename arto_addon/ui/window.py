@@ -13,6 +13,7 @@ from ..job.session import SecondBlender
 from ..job.verbs import Verb
 from ..live import live
 from ..plate import compare
+from ..plate.names import relit_file
 from ..plate.plate import name_of, show
 from ..plate.present import present, present_frames
 from ..plate.verify import verify_file
@@ -72,7 +73,7 @@ def show_looks(job: SecondBlender) -> str:
     shown = None
     with bpy.context.temp_override(window=window):
         for look in scene.arto.looks:
-            path = paths.relit_file(scene, look.name)
+            path = relit_file(scene, look.name)
             if path.is_file():
                 image = present(scene, path, look.name)
                 if shown is None or look.name == scene.arto.look:
@@ -86,7 +87,7 @@ def show_verified(job: SecondBlender) -> str:
     """Show the picture of where the plate differs from the render."""
     scene = _scene_of(job)
     path = Path(job.state.result)
-    if scene is not None and path == verify_file(paths.relit_file(scene)):
+    if scene is not None and path == verify_file(relit_file(scene)):
         window = bpy.context.window_manager.windows[0]
         with bpy.context.temp_override(window=window):
             reveal(show(path, "ARTO Verify"))

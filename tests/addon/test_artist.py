@@ -11,6 +11,7 @@ from arto.arto_addon.capture import planes
 from arto.arto_addon.fit import fit
 from arto.arto_addon.plate import compare
 from arto.arto_addon.plate.composite import save_composite
+from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.plate.present import present, use
 from arto.arto_addon.plate.verify import verify_file, verify_plate
 from arto.arto_addon.relight import inside, looks
@@ -38,7 +39,7 @@ def ready(tmp_path_factory):
 
 
 def _plate(scene, look: str | None = None) -> np.ndarray:
-    return next(iter(exr.read(paths.relit_file(scene, look)).values()))
+    return next(iter(exr.read(relit_file(scene, look)).values()))
 
 
 def test_states_of_a_ready_shot(ready) -> None:
@@ -89,7 +90,7 @@ def _share(text: str) -> int:
 
 def test_verify_agrees_with_its_own_truth_and_finds_what_is_off(ready) -> None:
     (path,) = (work.run(verify_plate(ready)),)
-    assert path == verify_file(paths.relit_file(ready))
+    assert path == verify_file(relit_file(ready))
     good = exr.header(path)["arto.verify"]
     assert _share(good) == 0
     ready.world.arto.strength = 2.0
@@ -103,7 +104,7 @@ def test_verify_agrees_with_its_own_truth_and_finds_what_is_off(ready) -> None:
 
 def test_no_verdict_on_a_plate_that_is_no_number(ready) -> None:
     """NaN is neither like a render nor unlike it: it must not agree."""
-    path = paths.relit_file(ready)
+    path = relit_file(ready)
     good = path.read_bytes()
     try:
         picture = _plate(ready)
@@ -155,7 +156,7 @@ def test_looks_are_worlds_by_name(ready) -> None:
     assert ready.world == second.world and ready.arto.look == "Warm 2"
     set_colour(ready, (0.1, 0.3, 0.8))
     done = work.run(looks.relight_looks(ready, LAYER))
-    assert done == [paths.relit_file(ready, "Warm"), paths.relit_file(ready, "Warm 2")]
+    assert done == [relit_file(ready, "Warm"), relit_file(ready, "Warm 2")]
     blue = _plate(ready, "Warm 2")
     ready.arto.active_look = 0
     assert ready.world == first.world and ready.arto.look == "Warm"
@@ -175,7 +176,7 @@ def test_looks_are_worlds_by_name(ready) -> None:
 def test_composite_without_a_render(ready) -> None:
     """Instead of the Render, the file has the plate's pixels; in a viewer it would need a render,
     and says so."""
-    present(ready, paths.relit_file(ready))
+    present(ready, relit_file(ready))
     with pytest.raises(SceneError, match="shows the render"):
         work.run(save_composite(ready, LAYER))
     settings = ready.render.image_settings

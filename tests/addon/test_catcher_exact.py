@@ -10,6 +10,7 @@ from arto.arto_addon import work
 from arto.arto_addon.blender.colour import working_space
 from arto.arto_addon.fit import fit
 from arto.arto_addon.plate import plate
+from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import paths
 from arto.arto_addon.stage.takes import TAKES
@@ -137,7 +138,7 @@ def test_on_an_empty_ground_footage_passes_denoised_too(tmp_path, world):
     scene.arto.footage = float_footage(filmed)
     captured(scene)
     picture, share = relit(scene)
-    path = paths.relit_file(scene)
+    path = relit_file(scene)
     assert exr.header(path)["arto.denoised"] == "Open Image Denoise"
     np.testing.assert_allclose(share, 1, atol=1e-4)
     np.testing.assert_allclose(picture, 0, atol=1e-4)
@@ -164,7 +165,7 @@ def test_beyond_the_ground_footage_passes_beside_things(tmp_path):
     scene.arto.footage = float_footage(filmed)
     captured(scene)
     relit(scene)
-    comp = exr.read(plate.comp_file(paths.relit_file(scene)))[""]
+    comp = exr.read(plate.comp_file(relit_file(scene)))[""]
     folder = paths.field_folder(scene).parent
     empty = np.all(
         [Field(folder / n / "field").layer("alpha") == 0 for n in ("ground", "things")], axis=0
@@ -181,7 +182,7 @@ def test_footage_of_a_file_passes_as_blender_reads_it(tmp_path):
     footage_of(scene, tmp_path)
     captured(scene)
     relit(scene)
-    comp = exr.read(plate.comp_file(paths.relit_file(scene)))[""]
+    comp = exr.read(plate.comp_file(relit_file(scene)))[""]
     encoded = np.array([64, 128, 191]) / 255
     linear = ((encoded + 0.055) / 1.055) ** 2.4
     np.testing.assert_allclose(comp, np.broadcast_to(linear, comp.shape), atol=1e-4)

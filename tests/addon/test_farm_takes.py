@@ -20,6 +20,7 @@ from arto.arto_addon.farm import templates
 from arto.arto_addon.farm.gather import gather
 from arto.arto_addon.fit import fit
 from arto.arto_addon.plate import plate
+from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.shot import paths
 from arto.arto_addon.stage.takes import TAKES
 from arto.core import exr
@@ -52,7 +53,7 @@ def fields(scene: bpy.types.Scene) -> dict[str, np.ndarray]:
 def relit(scene: bpy.types.Scene) -> list[np.ndarray]:
     """The plate, how much is seen of what is behind, and the comp on the footage."""
     found = relit_and_share(scene)
-    return [*found, exr.read(plate.comp_file(paths.relit_file(scene)))[""]]
+    return [*found, exr.read(plate.comp_file(relit_file(scene)))[""]]
 
 
 def test_parts_of_takes_are_what_one_machine_makes(tmp_path, monkeypatch):

@@ -10,8 +10,8 @@ from arto.arto_addon import work
 from arto.arto_addon.blender.colour import working_space
 from arto.arto_addon.plate import plate
 from arto.arto_addon.plate.footage import footage
+from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.relight import relight
-from arto.arto_addon.shot import paths
 from arto.arto_addon.world import kept
 from arto.core import exr
 from arto.core.errors import SceneError
@@ -30,7 +30,7 @@ def test_footage_is_put_behind_in_its_colour_space(tmp_path):
     image = footage_of(scene, tmp_path)
     captured(scene)
     picture, share = relit_and_share(scene)
-    comp = exr.read(plate.comp_file(paths.relit_file(scene)))[""]
+    comp = exr.read(plate.comp_file(relit_file(scene)))[""]
     encoded = np.array([64, 128, 191]) / 255
     linear = ((encoded + 0.055) / 1.055) ** 2.4
     np.testing.assert_allclose(comp, picture[..., :3] + share * linear, atol=2e-3)
@@ -52,7 +52,7 @@ def test_the_setting_goes_before_the_camera_and_a_moved_background_is_said(tmp_p
     grey.colorspace_settings.name = working_space()
     scene.arto.footage = grey
     picture, share = relit_and_share(scene)
-    comp = exr.read(plate.comp_file(paths.relit_file(scene)))[""]
+    comp = exr.read(plate.comp_file(relit_file(scene)))[""]
     np.testing.assert_allclose(comp, picture[..., :3] + 0.5 * share, atol=1e-5)
 
 
@@ -151,7 +151,7 @@ def test_footage_that_is_no_picture_is_said_before_anything_is_written(tmp_path,
     scenes = len(bpy.data.scenes)
     with pytest.raises(SceneError, match=match):
         relit_and_share(scene)
-    assert not paths.relit_file(scene).exists() and len(bpy.data.scenes) == scenes
+    assert not relit_file(scene).exists() and len(bpy.data.scenes) == scenes
 
 
 def in_file(path, pixels, data=(0, 0), display=None):

@@ -8,6 +8,7 @@ import pytest
 from arto.arto_addon import work
 from arto.arto_addon.blender.nodes import new_world
 from arto.arto_addon.fit import fit
+from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import paths
 from arto.arto_addon.stage import small
@@ -175,7 +176,7 @@ def test_pixels_that_are_no_number_are_said(shot, monkeypatch):
         work.run(relight.relight(shot))
     monkeypatch.undo()
     assert len(bpy.data.scenes) == scenes
-    np.testing.assert_array_equal(read(paths.relit_file(shot))[""], before)
+    np.testing.assert_array_equal(read(relit_file(shot))[""], before)
 
 
 def test_the_lamps_are_clamped_as_the_artist_clamps(shot):

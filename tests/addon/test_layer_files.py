@@ -10,10 +10,10 @@ from arto.arto_addon import work
 from arto.arto_addon.blender.output import set_format
 from arto.arto_addon.blender.version import FIVE
 from arto.arto_addon.plate import plate
+from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.relight import relight
 from arto.arto_addon.relight.back import mix_to_scene
 from arto.arto_addon.relight.many import relight_many
-from arto.arto_addon.shot import paths
 from arto.core import cryptomatte, exr
 from arto.core.errors import ExrError, SceneError
 from scene_tools import (
@@ -60,7 +60,7 @@ def test_a_reader_that_knows_nothing_of_arto(lit):
 def test_a_file_for_each_layer(lit, tmp_path, window):
     """Another reader finds bare R, G, B, A, which add up to the plate; the mixer goes on."""
     _, expected = relit_layers(lit)
-    path = paths.relit_file(lit)
+    path = relit_file(lit)
     plate.layers_file(path).unlink()
     lit.arto.layers_files, lit.arto.data_window = "EACH", window
     work.run(relight.relight(lit))
@@ -92,7 +92,7 @@ def test_a_file_for_each_layer(lit, tmp_path, window):
 def test_a_mix_of_single_files_goes_back_to_the_scene(lit):
     lit.arto.layers_files, lit.arto.data_window = "EACH", "CROP"
     work.run(relight.relight(lit))
-    assert mix_to_scene(lit) == plate.world_file(paths.relit_file(lit))
+    assert mix_to_scene(lit) == plate.world_file(relit_file(lit))
 
 
 def test_a_layers_file_is_no_other_file(lit):

@@ -11,6 +11,7 @@ from arto.arto_addon import work
 from arto.arto_addon.blender.compositing import add_output, compositor, new_compositor
 from arto.arto_addon.blender.nodes import new_world
 from arto.arto_addon.plate import plate
+from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.relight import relight
 from arto.arto_addon.relight.back import mix_to_scene
 from arto.arto_addon.shot import paths
@@ -205,7 +206,7 @@ def test_layers_of_a_shot_with_catchers_sum_to_its_things(tmp_path):
     captured(scene)
     picture, found = relit_layers(scene)
     np.testing.assert_allclose(sum(found.values()), picture[..., :3], rtol=1e-5, atol=1e-6)
-    assert plate.share_file(paths.relit_file(scene)).is_file()
+    assert plate.share_file(relit_file(scene)).is_file()
 
 
 def test_a_mix_goes_back_to_the_scene(tmp_path):
@@ -253,7 +254,7 @@ def test_a_mix_goes_back_to_the_scene(tmp_path):
 
 
 def relit_alpha(scene):
-    return exr.read(paths.relit_file(scene))[""][..., 3:]
+    return exr.read(relit_file(scene))[""][..., 3:]
 
 
 def test_instead_of_the_render_and_back(lit):

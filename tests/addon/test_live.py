@@ -12,6 +12,7 @@ from arto.arto_addon import shoot, work
 from arto.arto_addon.fit import fit
 from arto.arto_addon.live import live, maps
 from arto.arto_addon.live.viewer import Viewer, Wish
+from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.relight.light_key import HEADER, light_key
 from arto.arto_addon.relight.relight import compute
 from arto.arto_addon.shot import paths
@@ -77,7 +78,7 @@ def test_what_is_seen_is_the_plate(scene, on) -> None:
     """To 1e-3 of the picture's light, before denoising; the scene's lamps too."""
     seen = _rest(on)
     work.run(compute(scene, scene.view_layers[0].name))
-    plate = next(iter(exr.read(paths.relit_file(scene)).values()))
+    plate = next(iter(exr.read(relit_file(scene)).values()))
     assert np.abs(seen - plate).max() < 1e-3 * plate[..., :3].mean()
     # and after a turn, a strength and less of the scene's lamps
     scene.world.arto.rotation, scene.world.arto.strength = 1.1, 0.6
@@ -85,7 +86,7 @@ def test_what_is_seen_is_the_plate(scene, on) -> None:
     try:
         seen = _rest(on)
         work.run(compute(scene, scene.view_layers[0].name))
-        plate = next(iter(exr.read(paths.relit_file(scene)).values()))
+        plate = next(iter(exr.read(relit_file(scene)).values()))
         assert np.abs(seen - plate).max() < 1e-3 * plate[..., :3].mean()
     finally:
         scene.world.arto.rotation, scene.world.arto.strength = 0.0, 1.0
@@ -281,7 +282,7 @@ def test_the_world_behind_and_a_render_region(tmp_path) -> None:
     scene.render.border_min_x, scene.render.border_max_y = 0.25, 0.9
     set_colour(scene, (0.5, 0.4, 0.3), 2.0)
     work.run(shoot.shoot(scene))
-    plate = next(iter(exr.read(paths.relit_file(scene)).values()))
+    plate = next(iter(exr.read(relit_file(scene)).values()))
     assert (plate[..., 3] == 0).any() and (plate[1:4, 12:, 3] == 1).any()
     on = live.Live(scene)
     try:
@@ -334,7 +335,7 @@ def test_one_button(tmp_path) -> None:
     set_colour(scene, (0.5, 0.4, 0.3))
     shares = []
     (path,) = work.run(shoot.shoot(scene), lambda step: shares.append(step.share))
-    assert path == paths.relit_file(scene) and path.is_file()
+    assert path == relit_file(scene) and path.is_file()
     assert shares == sorted(shares) and shares[-1] == 1.0
     assert exr.header(path)[HEADER] == light_key(scene, scene.world)
     one = next(iter(exr.read(path).values()))

@@ -11,6 +11,7 @@ from arto.arto_addon import work
 from arto.arto_addon.blender.compositing import OUTPUT, compositor
 from arto.arto_addon.capture.sequence import capture_frames
 from arto.arto_addon.fit import fit
+from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.relight import many, relight
 from arto.arto_addon.shot import paths
 from arto.arto_addon.world import bake as bake_module
@@ -227,7 +228,7 @@ def test_frames_are_a_sequence_in_the_compositor(scene):
     from arto.arto_addon.blender.output import float_exr
 
     shown = []
-    folder = paths.relit_file(scene).parent
+    folder = relit_file(scene).parent
     float_exr(scene.render, multilayer=False)
     scene.cycles.samples, scene.render.use_compositing = 1, True
     for frame in (5, 6, 7):

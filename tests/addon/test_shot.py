@@ -15,6 +15,7 @@ from arto.arto_addon import work
 from arto.arto_addon.capture import capture
 from arto.arto_addon.fit import fit
 from arto.arto_addon.plate import plate
+from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.plate.verify import verify_file
 from arto.arto_addon.relight import many
 from arto.arto_addon.shot import paths, scene_id, status
@@ -98,9 +99,9 @@ def test_a_copied_scene_is_another(tmp_path):
     assert scene_id.of(copy) not in (None, scene_id.of(scene))
     assert paths.capture_folder(scene) == first.folder
     # and their plates are, with the output that was copied and with none
-    assert paths.relit_file(scene) != paths.relit_file(copy)
+    assert relit_file(scene) != relit_file(copy)
     scene.arto.output = copy.arto.output = ""
-    assert paths.relit_file(scene) != paths.relit_file(copy)
+    assert relit_file(scene) != relit_file(copy)
     assert plate.name_of(scene) != plate.name_of(copy)
 
 
@@ -148,18 +149,18 @@ def test_looks_have_plates_of_their_own(tmp_path):
     scene = small_scene(tmp_path)
     save(tmp_path)
     scene.arto.output = ""
-    assert paths.relit_file(scene) == tmp_path / "shot_relit.exr"
+    assert relit_file(scene) == tmp_path / "shot_relit.exr"
     assert plate.name_of(scene) == "ARTO Relit"
     names = set()
     for look in ("Sunset", "Noon", "relit", "a/b", "a:b", ""):
         scene.arto.look = look
-        names.add((paths.relit_file(scene).name, plate.name_of(scene)))
+        names.add((relit_file(scene).name, plate.name_of(scene)))
     assert len({n for n, _ in names}) == len({n for _, n in names}) == 6
     scene.arto.look = "Sunset"
-    assert paths.relit_file(scene) == tmp_path / "shot_Scene_Sunset.exr"
+    assert relit_file(scene) == tmp_path / "shot_Scene_Sunset.exr"
     assert plate.name_of(scene) == "ARTO Scene Sunset"
     scene.arto.output = str(tmp_path / "plates" / "sh010.v003")
-    assert paths.relit_file(scene) == tmp_path / "plates" / "sh010.v003_Sunset.exr"
+    assert relit_file(scene) == tmp_path / "plates" / "sh010.v003_Sunset.exr"
 
 
 def test_pairs_that_read_alike_are_two(tmp_path):
@@ -171,7 +172,7 @@ def test_pairs_that_read_alike_are_two(tmp_path):
     one.arto.output = two.arto.output = ""
     one.arto.look, two.arto.look = "C", "B C"
     assert plate.name_of(one) != plate.name_of(two)
-    assert paths.relit_file(one) != paths.relit_file(two)
+    assert relit_file(one) != relit_file(two)
 
 
 HOLD = """
@@ -259,7 +260,7 @@ def test_no_look_is_written_over_what_stands_beside_a_plate(scene, tmp_path, nam
         bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
         scene = bpy.context.scene
         other = name.rpartition("_")[0]
-        plates = [paths.relit_file(scene, look) for look in ("", other, name, f"{name}~x")]
+        plates = [relit_file(scene, look) for look in ("", other, name, f"{name}~x")]
         kinds = (plate.layers_file, plate.share_file, plate.light_file, verify_file)
         beside = {kind(path).name.lower() for kind in kinds for path in plates}
         beside |= {many._named(path, None, 7).name for path in plates}
@@ -279,7 +280,7 @@ def test_hashes_in_the_output_are_the_frames_number(scene, tmp_path):
         ("plain.exr", "", "plain.exr"),
     ):
         scene.arto.output, scene.arto.look = str(tmp_path / output), look
-        assert paths.relit_file(scene) == tmp_path / expected
+        assert relit_file(scene) == tmp_path / expected
     # a folder is one
     scene.arto.output, scene.arto.look = f"{tmp_path}/plates/", ""
-    assert paths.relit_file(scene).parent == tmp_path / "plates"
+    assert relit_file(scene).parent == tmp_path / "plates"

@@ -8,9 +8,9 @@ import OpenImageIO
 import pytest
 from arto.arto_addon import work
 from arto.arto_addon.plate import plate
+from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.relight import relight
 from arto.arto_addon.relight.many import relight_frames
-from arto.arto_addon.shot import paths
 from arto.core import exr
 from arto.core.errors import ExrError
 from scene_tools import captured, composited, in_compositor
@@ -70,7 +70,7 @@ def test_every_file_has_the_windows_and_the_same_pixels(shot):
                 assert data == (columns[0] - 3, rows[0] - 3, *size)
             else:
                 assert data == (-3, -3, 24, 18)
-    path = paths.relit_file(shot)
+    path = relit_file(shot)
     assert windows(path)[0][2:] < (24, 18)  # there was something to crop
     # what is behind is seen beyond the ground: footage times it must not be black
     assert windows(plate.share_file(path))[0] == (-3, -3, 24, 18)
@@ -120,7 +120,7 @@ def test_cropped_frames_are_a_sequence_of_whole_ones(shot, tmp_path):
 
 def test_an_overscan_that_leaves_nothing_is_said_before_the_work(shot):
     shot.arto.overscan = 9
-    path = paths.relit_file(shot)
+    path = relit_file(shot)
     with pytest.raises(ExrError, match="overscan of 9 pixels at each edge leaves nothing"):
         work.run(relight.relight(shot))
     assert not path.exists()
