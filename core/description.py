@@ -25,12 +25,12 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, TypeVar
 
 from .errors import ArtoError
+from .file_names import is_plain_name
 from .region import Region
 from .regular import read_regular
 
@@ -38,10 +38,7 @@ from .regular import read_regular
 MOST_BYTES = 64 << 20
 LARGEST_SIDE = 65536
 MOST_TILES = 100_000
-# Names that Windows keeps for devices, whatever ending they have.
-DEVICES = {"CON", "PRN", "AUX", "NUL"} | {f"{n}{i}" for n in ("COM", "LPT") for i in range(1, 10)}
 _Choice = TypeVar("_Choice", bound=str)
-_NAME = re.compile(r"[\w][\w .~-]{0,120}")
 
 
 class Description:
@@ -375,22 +372,6 @@ def is_finite(value: Any) -> bool:
         return type(value) in (int, float) and math.isfinite(value)
     except OverflowError:
         return False
-
-
-def is_plain_name(value: Any) -> bool:
-    """Say whether a value is the name of a file or folder, which leads nowhere else on any system.
-
-    Parameters
-    ----------
-    value : object
-
-    Returns
-    -------
-    bool
-    """
-    if not isinstance(value, str) or not _NAME.fullmatch(value) or value.endswith((" ", ".")):
-        return False
-    return value.split(".")[0].strip().upper() not in DEVICES
 
 
 def _refuse(constant: str) -> None:

@@ -26,8 +26,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import HemicubeError
-from .faces import FACE_NAMES, FACES, FINEST, LEAF_SIDES, SIDES, Leaf
+from .faces import FACE_NAMES, FACES, FINEST, LEAF_SIDES, Leaf
 from .measure import Extent, uniform_moments
+from .partition import Cell, Grid, Quadtree
 
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -81,9 +82,7 @@ class Hemicube:
             inside = n in LEAF_SIDES and 0 <= row < n and 0 <= column < n
             if face not in self.faces or not inside:
                 raise HemicubeError(f"no patch {row},{column} of {n}x{n} on the face '{face}'")
-        if self.leaves and (self.table >= 0).sum() != sum(
-            (FINEST // n) ** 2 for _, n, _, _ in self.leaves
-        ):
+        if isinstance(self.partition, Quadtree) and self.partition.overlap:
             raise HemicubeError("the patches of the hemicube overlap")
         if not (math.isfinite(self.size) and self.size > 0):
             raise HemicubeError(f"a hemicube of size {self.size}: choose a size above 0")
@@ -149,22 +148,17 @@ class Hemicube:
         except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as e:
             raise HemicubeError(f"this is not the description of a hemicube: {e!r:.200}") from None
 
-    def _rows(self, face: str) -> int:
-        if self.half_sides and face in SIDES:
-            return max(1, self.patches // 2)
-        return self.patches
+    @cached_property
+    def partition(self) -> Grid | Quadtree:
+        """How the faces are cut into patches."""
+        if self.leaves:
+            return Quadtree(self.faces, self.leaves)
+        return Grid(self.faces, self.patches, self.half_sides)
 
     @cached_property
-    def grid(self) -> tuple[tuple[str, int, int], ...]:
+    def grid(self) -> tuple[Cell, ...]:
         """(face, row, column) of each patch. Those of a leaf count leaves of its size."""
-        if self.leaves:
-            return tuple((face, row, column) for face, _, row, column in self.leaves)
-        return tuple(
-            (face, row, column)
-            for face in self.faces
-            for row in range(self._rows(face))
-            for column in range(self.patches)
-        )
+        return self.partition.cells
 
     def __len__(self) -> int:
         return len(self.grid)
@@ -182,7 +176,7 @@ class Hemicube:
             Into the patches.
         """
         start = next(k for k, (f, _, _) in enumerate(self.grid) if f == face)
-        return slice(start, start + self._rows(face) * self.patches)
+        return slice(start, start + sum(f == face for f, _, _ in self.grid))
 
     def patch_name(self, k: int) -> str:
         """Name a patch for messages.
@@ -199,40 +193,14 @@ class Hemicube:
         return f"{face} {row},{column}" + (f" of {self.leaves[k][1]}" if self.leaves else "")
 
     @cached_property
-    def table(self) -> NDArray[np.int32]:
-        """(F, 16, 16) int32: the leaf in which each cell of the finest grid lies, or -1."""
-        out = np.full((len(self.faces), FINEST, FINEST), -1, np.int32)
-        for k, (face, n, row, column) in enumerate(self.leaves):
-            s = FINEST // n
-            out[self.faces.index(face), row * s : (row + 1) * s, column * s : (column + 1) * s] = k
-        return out
-
-    @cached_property
     def sides(self) -> NDArray[np.intp]:
         """(K,) int: for each patch, how many patches of its size make up a side of the face."""
-        if self.leaves:
-            return np.array([n for _, n, _, _ in self.leaves], np.intp)
-        return np.full(len(self), self.patches, np.intp)
+        return self.partition.sides
 
     @cached_property
     def extents(self) -> NDArray[np.float64]:
         """(K, 4) float64: x0, x1, y0, y1 of each patch on its face, which is [-1, 1]^2."""
-        out = np.empty((len(self), 4))
-        for k, (_, n, row, column) in enumerate(self.leaves):
-            edges = np.array((column, column + 1, row, row + 1), np.float64)
-            out[k] = edges * (2 / n) - 1
-        if self.leaves:
-            return out
-        for k, (face, row, column) in enumerate(self.grid):
-            low = 0.0 if self.half_sides and face in SIDES else -1.0
-            rows = self._rows(face)
-            out[k] = (
-                -1 + 2 * column / self.patches,
-                -1 + 2 * (column + 1) / self.patches,
-                low + (1 - low) * row / rows,
-                low + (1 - low) * (row + 1) / rows,
-            )
-        return out
+        return self.partition.extents
 
     def frame(self, face: str) -> NDArray[np.float64]:
         """Compute the frame of a face in the world.
@@ -313,26 +281,7 @@ class Hemicube:
             own = local[:, hit].astype(np.float64)
             depth = np.abs(own[axis])
             x, y = (own[int(np.abs(e).argmax())] * e.sum() / depth for e in (eu, ev))
-            if self.leaves:
-                cells = [
-                    np.clip((t + 1) * (FINEST / 2), 0, FINEST - 1).astype(np.int32) for t in (y, x)
-                ]
-                k = self.table[self.faces.index(face)][tuple(cells)]
-                patch[hit] = k
-                x0, x1, y0, y1 = self.extents[k].T
-                u[hit] = (x - x0) / (x1 - x0)
-                v[hit] = (y - y0) / (y1 - y0)
-                continue
-            rows = self._rows(face)
-            low = 0.0 if self.half_sides and face in SIDES else -1.0
-            fu = (x + 1) * (self.patches / 2)
-            fv = (y - low) * (rows / (1 - low))
-            column = np.clip(fu, 0, self.patches - 1).astype(np.int32)
-            row = np.clip(np.floor(fv), -1, rows - 1).astype(np.int32)
-            start = self.face_slice(face).start
-            patch[hit] = np.where(fv < 0, -1, start + row * self.patches + column)
-            u[hit] = fu - column
-            v[hit] = fv - row
+            patch[hit], u[hit], v[hit] = self.partition.place(face, x, y)
         return patch, u, v
 
     @cached_property
@@ -377,9 +326,7 @@ class Hemicube:
     @property
     def closed(self) -> bool:
         """Whether every direction has a patch."""
-        if self.leaves:
-            return len(self.faces) == len(FACE_NAMES) and bool((self.table >= 0).all())
-        return len(self.faces) == len(FACE_NAMES) and not self.half_sides
+        return self.partition.closed
 
     def parallax_degrees(self, radius: float) -> float:
         """Compute how far the direction to a patch differs between the scene's centre and its rim.

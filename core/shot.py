@@ -2,68 +2,21 @@
 
 The identity of a shot is what decides the picture's frame: the scene, the camera and its lens, the
 frame and the size. The look of the scene is kept apart from it, in the fingerprint.
+
+Examples
+--------
+>>> Shot("Kitchen", 7, 960, 540, (), (), camera="Close").folders
+('untitled', 'Kitchen', 'Close_0007')
 """
 
 from __future__ import annotations
 
-import hashlib
-import re
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
-from .description import DEVICES, is_finite
+from .description import is_finite
 from .errors import ShotError
-
-# Characters that file systems refuse, characters that have a meaning in Blender's paths (braces, #,
-# %), and `~`, which marks the names that were changed here.
-_UNSAFE = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*{}#%~]')
-# The longest name in bytes. A path of three such folders and a file stays under the limit of
-# Windows for paths, and one such name stays under the limit of Linux for names.
-_LONGEST = 48
-
-
-def short_hash(*texts: str) -> str:
-    """Make six letters that tell texts apart.
-
-    Parameters
-    ----------
-    texts : str
-
-    Returns
-    -------
-    str
-        The first six hexadecimal digits of a SHA-256.
-    """
-    return hashlib.sha256("\0".join(texts).encode("utf-8", "surrogatepass")).hexdigest()[:6]
-
-
-def safe_name(name: str) -> str:
-    """Make a name for a folder out of any text.
-
-    A text that every file system takes stays as it is. Of another text remains what can be kept,
-    with a mark of the whole text, so that two texts never become one name.
-
-    Parameters
-    ----------
-    name : str
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> safe_name("Scene"), safe_name("shot 010.v2")
-    ('Scene', 'shot 010.v2')
-    >>> safe_name("a/b") == safe_name("a:b")
-    False
-    """
-    out = _UNSAFE.sub("_", name).strip(" ").rstrip(". ")
-    out = out.encode("utf-8", "replace")[:_LONGEST].decode("utf-8", "ignore").rstrip(". ")
-    device = out.split(".")[0].rstrip().upper() in DEVICES
-    if out == name and out and not device:
-        return out
-    return f"{'_' if device else ''}{out or '_'}~{short_hash(name)}"
+from .file_names import safe_name, short_hash
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import SceneError
-from ...core.shot import safe_name, short_hash
+from ...core.file_names import safe_name, short_hash
 from ..shot import home
 
 # Endings that an artist may give to an output by habit: .exr takes their place.

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from ...core import exr
 from ...core.errors import SceneError
+from ...core.file_names import safe_name
 from ...core.light.layers import part_of
-from ...core.shot import safe_name
 from ..blender.colour import working_space
 from ..blender.compositing import compositor
 from ..blender.nodes import new_world

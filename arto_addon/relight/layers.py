@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from ...core import exr
 from ...core.errors import SceneError
 from ...core.field.field import Field
+from ...core.file_names import safe_name
 from ...core.light.environment import Environment
 from ...core.light.layers import REST, by_faces, disc, part_of, residual, share_out, shares
 from ...core.light.light import PatchLight
 from ...core.relight import relights, together
-from ...core.shot import safe_name
 from ..blender import denoise
 from ..plate.names import relit_file
 from ..plate.plate import (

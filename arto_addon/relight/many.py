@@ -14,8 +14,8 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import CaptureSetError, SceneError
+from ...core.file_names import safe_name
 from ...core.relight import together
-from ...core.shot import safe_name
 from ..blender.nodes import new_world
 from ..capture.sequence import frame_kept
 from ..plate.names import numbers_frames, relit_file

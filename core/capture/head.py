@@ -226,34 +226,12 @@ class CaptureHead:
             "patterns": self.patterns.name,
             "pattern_polynomials": written["pattern_polynomials"],
         }
-        shot = self.shot.to_json() if self.shot else None
-        catchers = None if self.catchers is None else list(self.catchers)
-        for name, value in (
-            ("key", self.key),
-            ("samples", self.samples),
-            ("seed", self.seed),
-            ("route", self.route),
-            ("grain", self.grain),
-            ("adaptive", self.adaptive),
-            ("far", self.far),
-            ("blender", self.blender),
-            ("colour_space", self.colour_space),
-            ("film_transparent", self.film_transparent),
-            ("changed", self.changed),
-            ("catchers", catchers),
-            ("take", self.take),
-            ("kept", self.kept),
-            ("choice", self.choice),
-            ("separate", self.separate),
-            ("scene", self.scene),
-            ("file", self.file),
-            ("view_layer", self.view_layer),
-            ("shot", shot),
-            ("frame", self.frame),
-            ("fingerprint", self.fingerprint),
-        ):
+        for name in (f.name for f in fields(self) if f.name not in _APART):
+            value = getattr(self, name)
+            if isinstance(value, Shot):
+                value = value.to_json()
             if value is not None:
-                out[name] = value
+                out[name] = list(value) if isinstance(value, tuple) else value
         if self.caution is not None:
             out["caution"] = self.caution.to_json()
         elif self.fingerprint is not None:
@@ -313,6 +291,11 @@ class CaptureHead:
 
 # What `read` checks and `to_json` writes that is no value of its own.
 _WRITTEN = ("format", "version", "patches", "pattern_polynomials")
+# Values that `to_json` writes in places of their own; the others are written where they are known.
+_APART = {
+    *("hemicube", "patterns", "height", "width"),
+    *("caution", "others", "tiles", "seconds", "pair"),
+}
 
 
 def _check_version(said: Values) -> None:

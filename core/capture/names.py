@@ -14,7 +14,7 @@ import re
 from collections.abc import Mapping
 from typing import TypeVar
 
-from ..shot import safe_name
+from ..file_names import safe_name
 
 Pixels = TypeVar("Pixels")
 # The layer of the whole picture, with its alpha.

@@ -30,7 +30,7 @@ def of_face(cube: Hemicube, face: str) -> Counter[int]:
 
 
 def covers_everything(cube: Hemicube) -> bool:
-    return (cube.table >= 0).all() and cube.solid_angles.sum() == pytest.approx(4 * np.pi)
+    return (cube.partition.table >= 0).all() and cube.solid_angles.sum() == pytest.approx(4 * np.pi)
 
 
 def test_light_without_detail_needs_one_patch_a_face() -> None:
@@ -54,7 +54,7 @@ def test_detail_on_one_face_is_where_the_patches_go() -> None:
     for face in FACE_NAMES:
         if face != "right":
             assert of_face(cube, face) == {1: 1}
-    sizes = cube.sides[cube.table[right]]
+    sizes = cube.sides[cube.partition.table[right]]
     assert (sizes[6:10, 3:8] == FINEST).all()
 
 
@@ -82,7 +82,7 @@ def test_more_patches_are_never_worse() -> None:
         before = len(cube)
     # every cell that any pixel sees has a patch of its own in the end
     seen = probe.sum(axis=(3, 4, 5)) > 0
-    assert (cube.sides[cube.table][seen] == FINEST).mean() > 0.99
+    assert (cube.sides[cube.partition.table][seen] == FINEST).mean() > 0.99
 
 
 def test_a_black_probe_changes_nothing() -> None:

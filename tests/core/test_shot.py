@@ -7,7 +7,8 @@ import json
 
 import pytest
 from arto.core.errors import ShotError
-from arto.core.shot import Shot, safe_name
+from arto.core.file_names import safe_name
+from arto.core.shot import Shot
 from hypothesis import given
 from hypothesis import strategies as st
 
