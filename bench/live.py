@@ -16,6 +16,7 @@ import bpy
 import numpy as np
 from arto.arto_addon import shoot, work
 from arto.arto_addon.live import live
+from arto.arto_addon.live.image import IMAGE, put_away
 from arto.arto_addon.plate.names import relit_file
 from arto.core import exr
 
@@ -109,7 +110,7 @@ class _Hand:
     def close(self) -> None:
         live.push = self._wrapped
         self.live.close()
-        live.put_away(self.live.name)
+        put_away(self.live.name)
 
 
 def _measured(hand: _Hand, change: Callable[[int], None]) -> dict[str, float]:
@@ -154,7 +155,7 @@ def difference(scene: bpy.types.Scene) -> float:
     hand = _Hand(scene)
     try:
         hand.rest()
-        image = bpy.data.images[live.IMAGE]
+        image = bpy.data.images[IMAGE]
         pixels = np.empty(plate.size, np.float32)
         image.pixels.foreach_get(pixels)
         seen = pixels.reshape(plate.shape)[::-1]

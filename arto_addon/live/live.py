@@ -17,13 +17,10 @@ from typing import Any
 import bpy
 import numpy as np
 from bpy.app.handlers import persistent
-from numpy.typing import NDArray
 
 from ...core import exr
 from ...core.errors import ArtoError, SceneError
 from ...core.preview import Preview
-from ...core.region import Region
-from ..blender.pictures import put
 from ..blender.quitting import not_when_quitting, when_quitting
 from ..job import session
 from ..plate.names import relit_file
@@ -38,9 +35,9 @@ from ..world.check import check_world, world_of
 from ..world.kept import shows
 from ..world.own import gains_of
 from . import maps
+from .image import push, put_away, redraw_pictures, spaces, view_of
 from .viewer import Viewer, Wish
 
-IMAGE = "ARTO Live"
 EVERY = 1 / 30
 # Seconds after which the world is looked at even if Blender reported no change: it may
 # report none for a world that is linked from another file.
@@ -223,60 +220,6 @@ class Live:
         self.maps.close()
 
 
-def view_of(
-    scene: bpy.types.Scene, shape: tuple[int, int], region: Region
-) -> NDArray[np.float32] | None:
-    """The direction that each pixel of the scene's camera sees, (H, W, 3), 0 outside the region.
-
-    None without a camera, and for a panorama, whose pixels do not lie on a plane.
-    """
-    camera = scene.camera
-    if camera is None or camera.type != "CAMERA" or camera.data.type == "PANO":
-        return None
-    corners = np.array([tuple(c) for c in camera.data.view_frame(scene=scene)], np.float32)
-    # right top, right bottom, left bottom, left top
-    right, down = corners[0] - corners[3], corners[1] - corners[0]
-    height, width = shape
-    x = (np.arange(width, dtype=np.float32) + 0.5) / width
-    y = (np.arange(height, dtype=np.float32) + 0.5) / height
-    turned = np.array(camera.matrix_world.to_3x3().normalized(), np.float32)
-    if camera.data.type == "ORTHO":
-        look = turned @ np.array([0, 0, -1], np.float32)
-        found = np.broadcast_to(look, (height, width, 3))
-    else:
-        found = (corners[3] + x[None, :, None] * right + y[:, None, None] * down) @ turned.T
-    out = np.zeros_like(found)
-    out[region.slices] = found[region.slices]
-    return out
-
-
-def push(picture: NDArray[np.float32], name: str) -> bpy.types.Image:
-    """Put a picture (H, W, 4), rows top-down, into the live image.
-
-    Editors that show the image called `name`, the plate, show the live image from now on.
-    """
-    image = put(IMAGE, picture)
-    for space in spaces():
-        shown = space.image
-        if shown is not None and shown != image and shown.name == name:
-            space.image = image
-    return image
-
-
-def spaces() -> list[bpy.types.SpaceImageEditor]:
-    """The image editors that are open."""
-    manager = bpy.context.window_manager
-    areas = [a for w in manager.windows for a in w.screen.areas] if manager else []
-    return [a.spaces.active for a in areas if a.type == "IMAGE_EDITOR"]
-
-
-def redraw_pictures() -> None:
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type in {"IMAGE_EDITOR", "PROPERTIES", "VIEW_3D"}:
-                area.tag_redraw()
-
-
 # Opens an image where the artist sees it. The window sets this function (`ui`).
 reveal: Callable[[bpy.types.Image], None] | None = None
 current: Live | None = None
@@ -302,18 +245,6 @@ def stop() -> None:
     ended, current = current, None
     ended.close()
     put_away(ended.name)
-
-
-def put_away(name: str, *others: str) -> None:
-    """Remove the live image and other images, which are in no file.
-
-    name: the plate's, which editors show in their place; others: names of the other images.
-    """
-    for image in filter(None, map(bpy.data.images.get, (IMAGE, *others))):
-        for space in spaces():
-            if space.image == image:
-                space.image = bpy.data.images.get(name)
-        bpy.data.images.remove(image)
 
 
 def _tick() -> float | None:

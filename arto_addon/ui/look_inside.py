@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core.errors import ArtoError
 from ..blender.pictures import put
-from ..live.live import IMAGE as LIVE
+from ..live.image import IMAGE as LIVE
 from ..plate import compare
 from ..plate.plate import name_of
 from ..relight import inside

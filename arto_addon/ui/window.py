@@ -12,6 +12,7 @@ from ..job import session, snapshot
 from ..job.session import SecondBlender
 from ..job.verbs import Verb
 from ..live import live
+from ..live.image import put_away
 from ..plate import compare
 from ..plate.names import relit_file
 from ..plate.plate import name_of, show
@@ -101,7 +102,7 @@ OURS = (inside.IMAGE, inside.FROM, compare.IMAGE)
 @persistent
 def _before_save(*_: object) -> None:
     if not snapshot.taking:
-        live.put_away(name_of(bpy.context.scene), *OURS)
+        put_away(name_of(bpy.context.scene), *OURS)
         if live.current is not None:
             live.current._wished = ()
 
@@ -136,7 +137,7 @@ def unregister() -> None:
     live.reveal = None
     if _before_save in bpy.app.handlers.save_pre:
         bpy.app.handlers.save_pre.remove(_before_save)
-        live.put_away(name_of(bpy.context.scene), *OURS)
+        put_away(name_of(bpy.context.scene), *OURS)
     while _keys:
         keymap, item = _keys.pop()
         keymap.keymap_items.remove(item)

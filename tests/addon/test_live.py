@@ -11,6 +11,7 @@ import pytest
 from arto.arto_addon import shoot, work
 from arto.arto_addon.fit import fit
 from arto.arto_addon.live import live, maps
+from arto.arto_addon.live.image import IMAGE, put_away
 from arto.arto_addon.live.viewer import Viewer, Wish
 from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.relight.light_key import HEADER, light_key
@@ -54,7 +55,7 @@ def on(scene):
     found = live.Live(scene)
     yield found
     found.close()
-    live.put_away(found.name)
+    put_away(found.name)
 
 
 def _rest(on: live.Live) -> np.ndarray:
@@ -68,7 +69,7 @@ def _rest(on: live.Live) -> np.ndarray:
         if on.settled:
             break
         time.sleep(0.02)
-    image = bpy.data.images[live.IMAGE]
+    image = bpy.data.images[IMAGE]
     pixels = np.empty(len(image.pixels), np.float32)
     image.pixels.foreach_get(pixels)
     return pixels.reshape(image.size[1], image.size[0], 4)[::-1]
@@ -249,7 +250,7 @@ def test_nothing_is_left(scene) -> None:
     _rest(found)
     folder, process = found.maps._folder, found.maps._process
     found.close()
-    live.put_away(found.name)
+    put_away(found.name)
     assert not folder.exists() and process.poll() is not None
     assert {i.name for i in bpy.data.images} == before
 
@@ -289,7 +290,7 @@ def test_the_world_behind_and_a_render_region(tmp_path) -> None:
         seen = _rest(on)
     finally:
         on.close()
-        live.put_away(on.name)
+        put_away(on.name)
     assert np.abs(seen - plate).max() < 1e-3 * plate[..., :3].mean()
 
 
