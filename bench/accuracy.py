@@ -97,7 +97,8 @@ class Shot:
         there = captured(scene_name, size, samples)
         # the root of its shots' folders, and the scene that they are of
         self.folder = there.folder.parents[3].resolve()
-        self.scene_id = there.head.shot.scene_id if there.head.shot else None
+        shot = there.head.shot
+        self.scene_id = (shot.scene_id if shot else None) or ""
         scene = self.scene()
         work.run(fit.fit(scene))
         self.fields = {ARTO: Field(paths.field_folder(scene))}

@@ -58,7 +58,8 @@ class Shot:
         self.name, self.size, self.samples, self.settings = name, size, samples, settings
         there = captured(name, size, samples, **settings)
         self.folder = there.folder.parents[3].resolve()
-        self.scene_id = there.head.shot.scene_id if there.head.shot else None
+        shot = there.head.shot
+        self.scene_id = (shot.scene_id if shot else None) or ""
         self.seconds = there.head.seconds or 0.0
         scene = self.scene()
         # a field that is there may be of other code

@@ -250,7 +250,7 @@ def _made(asked: Question) -> str:
     scene.cycles.device = asked.device
     scene.arto.folder = asked.folder
     with bpy.data.libraries.load(asked.blend) as (_, into):
-        into.worlds = [asked.world]
+        into.worlds.append(asked.world)
     world = into.worlds[0]
     try:
         for name, pixels in asked.painted.items():

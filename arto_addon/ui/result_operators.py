@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import bpy
 
 from ...core import exr
@@ -21,11 +19,11 @@ from .reveal import reveal
 
 def _has_plate(cls: type, context: bpy.types.Context) -> bool:
     try:
-        path: Path | None = relit_file(context.scene)
+        path = relit_file(context.scene)
     except SceneError as e:
         cls.poll_message_set(str(e))
         return False
-    if path is None or not path.is_file():
+    if not path.is_file():
         cls.poll_message_set("There is no relit picture yet: press Relight")
         return False
     return True

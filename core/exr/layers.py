@@ -177,7 +177,7 @@ class Layers:
         return found
 
     def _filled(self, name: str, planes: list[NDArray]) -> NDArray:
-        if any(pixels is None for pixels in planes):
+        if not all(isinstance(pixels, np.ndarray) for pixels in planes):  # else None
             raise ExrError(f"{self.path} has no pixels in '{name}': make it again")
         if len({pixels.shape for pixels in planes}) > 1:
             raise ExrError(

@@ -180,7 +180,7 @@ def place(heads: Sequence[dict[str, Any]], parts: Sequence[dict[str, NDArray]]) 
         there = slice(y, y + box[3] - box[1] + 1), slice(x, x + box[2] - box[0] + 1)
         shape = box[3] - box[1] + 1, box[2] - box[0] + 1
         for name, pixels in channels.items():
-            if pixels is not None and pixels.shape == shape:
+            if isinstance(pixels, np.ndarray) and pixels.shape == shape:  # else None
                 out = np.zeros((height, width), pixels.dtype)
                 out[there] = pixels
                 channels[name] = out

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 from types import SimpleNamespace
 from typing import Any
@@ -14,7 +15,10 @@ from arto.arto_addon.relight.light_key import light_key
 from arto.arto_addon.settings.setting import Setting
 from arto.arto_addon.settings.table import SETTINGS
 from arto.arto_addon.ui import light_panel, more_panels, result_panel, shot_panel
+from arto.arto_addon.ui.lists import ENTRIES
 from scene_tools import hdri, small_scene, smooth
+
+from tools import setting_types
 
 VALUES = [s for s in SETTINGS if s.kind not in ("image", "list")]
 
@@ -60,6 +64,20 @@ def test_a_setting_says_all_that_hangs_on_it():
 def test_a_scene_has_the_settings_of_the_table(scene):
     there = {p.identifier for p in scene.arto.bl_rna.properties} - {"rna_type", "name"}
     assert there == {s.name for s in SETTINGS}
+
+
+def test_the_types_of_settings_are_those_of_the_table():
+    """pyright checks the names of settings and the items of choices by these files."""
+    assert setting_types.FILE.read_text(encoding="utf-8") == setting_types.text()
+    lists = setting_types.FILE.with_name("arto_lists.pyi").read_text(encoding="utf-8")
+    said = {
+        node.name: {line.target.id for line in node.body if isinstance(line, ast.AnnAssign)}
+        for node in ast.parse(lists).body
+        if isinstance(node, ast.ClassDef)
+    }
+    for kind in ENTRIES.values():
+        there = {p.identifier for p in kind.bl_rna.properties} - {"rna_type"}
+        assert there in said.values(), kind
 
 
 @pytest.mark.parametrize("setting", VALUES, ids=lambda s: s.name)

@@ -1,3 +1,5 @@
 from typing import Any
 
+from . import types as types
+
 def __getattr__(name: str) -> Any: ...

@@ -1,0 +1,58 @@
+"""The settings on `scene.arto`, made of the table: `python -m tools.setting_types`."""
+
+from typing import Any, Literal
+
+from arto_lists import Groups, Lamps, Looks
+
+class Settings:
+    preset: Literal["full", "paper", "custom"]
+    faces: set[Literal["top", "left", "right", "back", "front", "bottom"]]
+    half_sides: bool
+    patches: int
+    adaptive: bool
+    align: Literal["world", "camera"]
+    rotation: float
+    far: bool
+    size: float
+    samples: int
+    quality: Literal["DRAFT", "GOOD", "FINAL", "CUSTOM"]
+    patterns: Literal["moments", "moments_uv", "linear", "paper", "white", "packed", "packed_linear", "lobes"]
+    grain: bool
+    route: Literal["all", "pattern", "single"]
+    seed: int
+    memory: int
+    keep: Literal["never", "fits", "always"]
+    keep_limit: float
+    support: Literal["auto", "whole", "linear", "box", "quadratic", "oriented_box", "gaussian", "double", "bell", "search", "stage_and_matte"]
+    separate: bool
+    own_lamps: float
+    lamps: bool
+    lamp_samples: int
+    denoise: bool
+    environment_width: int
+    look: str
+    output: str
+    layers: Literal["OFF", "FACES", "GROUPS"]
+    layer_prefix: str
+    layers_files: Literal["ONE", "EACH"]
+    layers_half: bool
+    write_data: bool
+    cryptomatte: str
+    shadows: Literal["MULTIPLY", "ADD"]
+    data_window: Literal["FULL", "CROP"]
+    overscan: int
+    use_in_compositor: Literal["VIEWER", "RENDER"]
+    compare: Literal["OFF", "SIDE", "WIPE", "RENDER"]
+    wipe: float
+    footage: Any
+    live_finish: bool
+    looks: Looks
+    active_look: int
+    own_groups: Lamps
+    active_own_group: int
+    groups: Groups
+    active_group: int
+    folder: str
+    scene_id: str
+    bl_rna: Any
+    def is_property_set(self, name: str) -> bool: ...
