@@ -49,6 +49,24 @@ def _noded(block: Any) -> Any:
     return block
 
 
+def dark_world(world: bpy.types.World | None, name: str) -> bpy.types.World:
+    """Make a world without light that has the properties of another, as materials may read them.
+
+    Attribute nodes and drivers find a scene's world by the scene, whatever shader it has.
+    """
+    if world is None:
+        dark = new_world(name)
+    else:
+        dark = _noded(world.copy())
+        dark.name, dark.lightgroup = name, ""
+        dark.node_tree.animation_data_clear()
+        for rays in dark.cycles_visibility.bl_rna.properties:
+            if rays.type == "BOOLEAN" and not rays.is_readonly:
+                setattr(dark.cycles_visibility, rays.identifier, True)
+    dark.node_tree.nodes.clear()
+    return dark
+
+
 def shader_tree(block: bpy.types.ID) -> bpy.types.NodeTree | None:
     """The node tree by which a material, world or lamp is rendered; None where none is in use."""
     return block.node_tree if FIVE or block.use_nodes else None

@@ -6,7 +6,7 @@ import bpy
 
 from ...core.errors import SceneError
 from ..stage.stage import picture_size
-from ..world.check import check_no_volume, world_of
+from ..world.check import check_light_of, world_of
 from .simulations import unbaked
 
 # The fewest pixels on a side that Blender renders, with denoising and the world behind.
@@ -26,7 +26,7 @@ def check_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> None:
     if scene.camera is None:
         raise SceneError("the scene has no camera: add one, or make one the scene's camera")
     if world := world_of(scene, view_layer):
-        check_no_volume(world)
+        check_light_of(scene, world)
     width, height = picture_size(scene)
     if min(width, height) < LEAST_PIXELS:
         raise SceneError(

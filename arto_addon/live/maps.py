@@ -33,6 +33,8 @@ from ..world import kept
 from ..world.bake import rough
 from ..world.check import check_world
 from ..world.dials import without_dials
+from ..world.still import is_restless, still
+from ..world.studio import like_textures, of_textures
 
 # How a line with an answer begins: Blender prints other lines too.
 ANSWER = "ARTO map "
@@ -48,9 +50,9 @@ class Question:
     """What the window asks the second Blender for.
 
     blend: a file with the world in it; world: the world's name there; width: the width of a full
-    map, 0 for a rough map; space: the working colour space; painted: for each image that is in no
-    file, its name and the file with its pixels; folder: where full maps are kept; out: the .npy
-    file to write.
+    map, 0 for a rough map; space: the working colour space; textures: see `studio.of_textures`;
+    painted: for each image that is in no file, its name and the file with its pixels; folder: where
+    full maps are kept; out: the .npy file to write.
     """
 
     blend: str
@@ -60,6 +62,7 @@ class Question:
     subframe: float
     space: str
     device: str
+    textures: list[object]
     painted: dict[str, str]
     folder: str
     out: str
@@ -138,16 +141,7 @@ class Maps:
         self._number += 1
         blend = self._folder / f"world{self._number}.blend"
         painted = {}
-        # absolute paths below: the small file lies in another folder than the artist's
-        written = world.copy() if world.library else world  # a linked world is not written
-        name = written.name
-        try:
-            bpy.data.libraries.write(str(blend), {written}, path_remap="ABSOLUTE", fake_user=True)
-        except (OSError, RuntimeError) as e:
-            raise SceneError(f"the world cannot be written to {blend} ({e})") from e
-        finally:
-            if written != world:
-                bpy.data.worlds.remove(written)
+        name = _write(scene, layer, world, blend)
         for image in images(world):
             if in_no_file(image):
                 painted[image.name] = str(self._folder / painted_pixels(image, self._folder))
@@ -159,6 +153,7 @@ class Maps:
             subframe=scene.frame_subframe,
             space=working_space(),
             device=scene.cycles.device,
+            textures=of_textures(scene),
             painted=painted,
             folder=str(home.absolute(scene.arto.folder)),
             out=str(self._folder / "map.npy"),
@@ -215,6 +210,20 @@ class Maps:
         marked.remove_quietly(self._folder, "maps", self._folder.parent)
 
 
+def _write(scene: bpy.types.Scene, layer: str, world: bpy.types.World, blend: Path) -> str:
+    """Write a world into a small file -> the world's name there. Raises SceneError."""
+    with contextlib.ExitStack() as held:
+        if world.library or is_restless(world):
+            # a linked world is not written, and the other Blender does not have this scene
+            world = held.enter_context(still(scene, layer, world))
+        try:
+            # absolute paths: the small file lies in another folder than the artist's
+            bpy.data.libraries.write(str(blend), {world}, path_remap="ABSOLUTE", fake_user=True)
+        except (OSError, RuntimeError) as e:
+            raise SceneError(f"the world cannot be written to {blend} ({e})") from e
+        return world.name
+
+
 def images(world: bpy.types.World) -> list[bpy.types.Image]:
     """The images that a world's nodes use, groups included."""
     found = [n for t in trees(shader_tree(world), set()) for n in t.nodes]
@@ -248,6 +257,7 @@ def _made(asked: Question) -> str:
     work_in(asked.space)
     scene.frame_set(asked.frame, subframe=asked.subframe)
     scene.cycles.device = asked.device
+    like_textures(scene, asked.textures)
     scene.arto.folder = asked.folder
     with bpy.data.libraries.load(asked.blend) as (_, into):
         into.worlds.append(asked.world)
@@ -261,7 +271,7 @@ def _made(asked: Question) -> str:
             for image in images(world):
                 if reduced := _reduced(image):
                     image.user_remap(reduced)
-        with without_dials(world) as (plain, _, _):
+        with without_dials(scene, scene.view_layers[0].name, world) as (plain, _, _):
             if asked.width:
                 found = kept.environment(scene, asked.width, None, plain)
             else:

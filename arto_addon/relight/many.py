@@ -145,7 +145,8 @@ def _lent(
     """
     world = lent.enter_context(_world_showing(file)) if file else None
     if turn:
-        world = lent.enter_context(turned(world or check_world(scene, view_layer), turn * math.tau))
+        world = world or check_world(scene, view_layer)
+        world = lent.enter_context(turned(scene, view_layer, world, turn * math.tau))
     return world
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from ..blender.nodes import new_world
+from ..blender.nodes import dark_world
 from .stage import Stage
 
 
@@ -77,8 +77,7 @@ def prepare(on: Stage, layers: int) -> None:
     layer = on.scene.view_layers[0]
     layer.cycles.denoising_store_passes = True
     layer.use_pass_z = True
-    world = on.made(new_world("ARTO Black"))
-    world.node_tree.nodes.clear()
+    world = on.made(dark_world(on.scene.world, "ARTO Black"))
     on.changed["world"] = [on.scene.world.name if on.scene.world else None, None]
     on.scene.world = world
     layer.world_override = None

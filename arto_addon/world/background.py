@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from ...core import exr
 from ...core.capture.names import combined
 from ...core.region import Region
-from ..blender.nodes import shader_tree, trees
 from ..blender.output import float_exr, write_to
+from ..blender.reached import reached
 from ..shot.shot import layer_of
 from ..stage.bounds import rendered
 from ..stage.settings import prepare
@@ -21,6 +21,7 @@ from ..stage.stage import Stage, free_mark, picture_size, set_region, stage
 from ..stage.takes import WHOLE, take
 from ..work import Render, blocking_render
 from .check import check_world
+from .still import still
 
 # The most samples of a pixel of the background, and the noise at which a pixel has enough samples.
 BACKGROUND_SAMPLES = 64
@@ -30,8 +31,8 @@ BACKGROUND_NOISE = 0.002
 def _set(on: Stage, world: bpy.types.World, region: Region, even: bool) -> None:
     """Put the world on the stage, and set the samples for a render of the world alone.
 
-    even: give every pixel all samples. A sun may be smaller than a pixel. With adaptive sampling,
-    a pixel that has missed the sun would then stop early.
+    world: a copy, which is changed; even: give every pixel all samples. A sun may be smaller than a
+    pixel. With adaptive sampling, a pixel that has missed the sun would then stop early.
     """
     prepare(on, layers=0)
     # The field was rendered by Cycles, whatever engine the artist works with now.
@@ -39,7 +40,7 @@ def _set(on: Stage, world: bpy.types.World, region: Region, even: bool) -> None:
     on.scene.render.film_transparent = False
     cycles, layer = on.scene.cycles, on.scene.view_layers[0]
     layer.use_pass_z = layer.cycles.denoising_store_passes = False
-    on.scene.world = on.made(world.copy())
+    on.scene.world = world
     # Nothing is lit here, so Cycles needs no map for importance sampling.
     on.scene.world.cycles.sampling_method = "NONE"
     cycles.samples = BACKGROUND_SAMPLES
@@ -81,8 +82,9 @@ def background(
     width, height = picture_size(scene)
     region = region or Region(0, 0, width, height)
     out = np.zeros((height, width, 3), np.float32)
-    with stage(scene, layer) as on:
-        _set(on, world, region, even)
+    with still(scene, layer, world, camera=False) as held, stage(scene, layer) as on:
+        on.scene.background_set = None
+        _set(on, held, region, even)
         float_exr(on.scene.render, multilayer=False)
         root = on.scene.collection
         for child in list(root.children):
@@ -105,8 +107,7 @@ def holds_out(scene: bpy.types.Scene, view_layer: str) -> bool:
     return any(o.is_holdout for o in bpy.data.objects) or any(
         node.bl_idname == "ShaderNodeHoldout"
         for material in bpy.data.materials
-        for tree in trees(shader_tree(material), set())
-        for node in tree.nodes
+        for node in reached(material)
     )
 
 
@@ -126,8 +127,8 @@ def background_with_holes(
     world = world or check_world(scene, view_layer)
     width, height = picture_size(scene)
     out = np.zeros((height, width, 4), np.float32)
-    with stage(scene, view_layer) as on:
-        group = _set_behind(on, world, region)
+    with still(scene, view_layer, world, camera=False) as held, stage(scene, view_layer) as on:
+        group = _set_behind(on, held, region)
         parts = _render(on)
     light = next(pixels for name, pixels in parts.items() if name.endswith(group))
     whole = combined(parts)
@@ -148,8 +149,12 @@ def without_holes(
     world = world or check_world(scene, view_layer)
     width, height = picture_size(scene)
     out = np.zeros((height, width), np.float32)
-    with stage(scene, view_layer) as on, take(rendered(on), WHOLE):
-        _set_behind(on, world, region)
+    with (
+        still(scene, view_layer, world, camera=False) as held,
+        stage(scene, view_layer) as on,
+        take(rendered(on), WHOLE),
+    ):
+        _set_behind(on, held, region)
         parts = _render(on)
     whole = combined(parts)
     out[region.slices] = whole[..., 3]

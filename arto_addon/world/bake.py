@@ -17,10 +17,13 @@ from numpy.typing import NDArray
 
 from ...core.light.environment import Environment
 from ...core.region import Region
-from ..blender.nodes import Nodes, new_material, shader_tree, trees
+from ..blender.nodes import Nodes, new_material, shader_tree
+from ..blender.reached import reached
+from ..shot.shot import layer_of
 from ..stage.stage import set_region
 from .check import check_images, check_world
 from .detail import detail
+from .still import still
 from .studio import render as render_studio
 from .studio import studio_scene
 
@@ -72,11 +75,7 @@ def sees_the_camera(world: bpy.types.World) -> bool:
         for p in rays.bl_rna.properties
         if p.type == "BOOLEAN" and not p.is_readonly
     )
-    return hidden or any(
-        node.bl_idname == "ShaderNodeLightPath"
-        for tree in trees(shader_tree(world), set())
-        for node in tree.nodes
-    )
+    return hidden or any(node.bl_idname == "ShaderNodeLightPath" for node in reached(world))
 
 
 def _by_area(world: bpy.types.World) -> None:
@@ -140,10 +139,15 @@ def _power_of_two(samples: float) -> int:
 
 
 @contextmanager
-def _panorama(scene: bpy.types.Scene, world: bpy.types.World) -> Iterator[bpy.types.Scene]:
+def _panorama(
+    scene: bpy.types.Scene, view_layer: str | None, world: bpy.types.World
+) -> Iterator[bpy.types.Scene]:
     """Make a studio whose camera sees all of a world, as the scene's surfaces see the world."""
-    check_images(world)
-    with studio_scene(scene, world, "ARTO World") as (studio, made):
+    check_images(world, scene.frame_current)
+    with (
+        still(scene, view_layer or layer_of(scene), world) as held,
+        studio_scene(scene, held, "ARTO World") as (studio, made),
+    ):
         lens = bpy.data.cameras.new("ARTO Panorama")
         camera = bpy.data.objects.new("ARTO Panorama", lens)
         made += [camera, lens]
@@ -169,7 +173,7 @@ def rough(scene: bpy.types.Scene, width: int, world: bpy.types.World) -> Environ
 
     A texel has few samples, so detail finer than a texel is noisy.
     """
-    with _panorama(scene, world) as studio:
+    with _panorama(scene, None, world) as studio:
         studio.render.resolution_x, studio.render.resolution_y = width, width // 2
         studio.cycles.samples = ROUGH_SAMPLES
         return Environment(np.ascontiguousarray(render_studio(studio)[..., :3]))
@@ -189,7 +193,7 @@ def bake(
     or an image of the world is missing; CancelledError.
     """
     world = world or check_world(scene, view_layer)
-    with _panorama(scene, world) as studio:
+    with _panorama(scene, view_layer, world) as studio:
         finest = detail(world)
         # Lamps are found in small texels. A coarse map gets the means of the small texels.
         scale = math.ceil(min(finest, LEAST_WIDTH) / width)

@@ -7,8 +7,11 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import SceneError
-from ..blender.nodes import shader_tree, trees
+from ..blender.nodes import shader_tree
+from ..blender.reached import gives, reached
 from ..shot.shot import layer_of
+from .images import files_at, image_nodes
+from .still import check_pixels
 
 
 def world_of(scene: bpy.types.Scene, view_layer: str | None = None) -> bpy.types.World | None:
@@ -37,40 +40,59 @@ def check_world(scene: bpy.types.Scene, view_layer: str | None = None) -> bpy.ty
             f"the view layer '{layer.name}' has Environment off, so that no world lights it: turn "
             "it on (View Layer properties, Filter)"
         )
-    check_no_volume(world)
-    for tree in trees(shader_tree(world), set()):
-        for node in tree.nodes:
-            if node.bl_idname not in {"ShaderNodeTexEnvironment", "ShaderNodeTexImage"}:
+    check_light_of(scene, world)
+    for node in image_nodes(world):
+        if node.image is None:
+            raise SceneError(f"the world's node '{node.name}' has no image: choose an HDRI")
+        for path in files_at(node, scene.frame_current):
+            if path.is_file():
                 continue
-            image = node.image
-            if image is None:
-                if any(o.is_linked for o in node.outputs):
-                    raise SceneError(f"the world's node '{node.name}' has no image: choose an HDRI")
-            elif image.source == "FILE" and not image.packed_file:
-                path = Path(bpy.path.abspath(image.filepath, library=image.library))
-                if not path.is_file():
-                    raise SceneError(
-                        f"the world's image '{image.name}' is missing on disk ({path}): find it "
-                        "again (File, External Data, Find Missing Files), or choose another"
-                    )
+            if node.image.source == "SEQUENCE":
+                raise SceneError(
+                    f"the world's image '{node.image.name}' is a sequence without a file for frame "
+                    f"{scene.frame_current} ({path}): put the file there, or set the node's Frames "
+                    "and Offset to the files that are there"
+                )
+            raise SceneError(
+                f"the world's image '{node.image.name}' is missing on disk ({path}): find it "
+                "again (File, External Data, Find Missing Files), or choose another"
+            )
     return world
 
 
-def check_images(world: bpy.types.World) -> None:
+def check_images(world: bpy.types.World, frame: int) -> None:
     """Raise SceneError where a file of the world's images cannot be read.
 
     Cycles would show magenta in place of the image. The check loads the images, as a render would.
     """
-    for tree in trees(shader_tree(world), set()):
-        for node in tree.nodes:
-            image = getattr(node, "image", None)
-            if image is None or not any(o.is_linked for o in node.outputs):
-                continue
-            if image.source in {"FILE", "SEQUENCE", "MOVIE"} and min(image.size) == 0:
-                raise SceneError(
-                    f"the world's image '{image.name}' cannot be read, it is damaged or cut off: "
-                    "copy the file anew, or choose another"
-                )
+    for node in image_nodes(world):
+        if node.image is None:
+            continue
+        if node.image.source == "SEQUENCE":
+            for path in files_at(node, frame):
+                _check_readable(path)
+        elif node.image.source in {"FILE", "MOVIE", "TILED"} and min(node.image.size) == 0:
+            raise _unreadable(node.image.name)
+
+
+def _unreadable(name: str) -> SceneError:
+    return SceneError(
+        f"the world's image '{name}' cannot be read, it is damaged or cut off: copy the file "
+        "anew, or choose another"
+    )
+
+
+def _check_readable(path: Path) -> None:
+    """Raise SceneError where one file of a sequence cannot be read."""
+    try:
+        alone = bpy.data.images.load(str(path))
+    except RuntimeError as e:
+        raise _unreadable(path.name) from e
+    try:
+        if min(alone.size) == 0:
+            raise _unreadable(path.name)
+    finally:
+        bpy.data.images.remove(alone)
 
 
 def _fills(socket: bpy.types.NodeSocket) -> bool:
@@ -87,6 +109,19 @@ def _fills(socket: bpy.types.NodeSocket) -> bool:
     amounts = ("Density", "Emission Strength", "Blackbody Intensity")
     found = [s for s in node.inputs if s.name in amounts and s.enabled]
     return not found or any(s.is_linked or s.default_value for s in found)
+
+
+def check_light_of(scene: bpy.types.Scene, world: bpy.types.World) -> None:
+    """Raise SceneError for a world whose light no map has, however the map is made."""
+    check_no_volume(world)
+    check_pixels(scene, world)
+    bounces = world.cycles.max_bounces
+    if bounces < scene.cycles.max_bounces and world.cycles.sampling_method != "NONE":
+        raise SceneError(
+            f"the world's light ends after {bounces} bounces (World properties, Settings, Max "
+            f"Bounces), which only a render can do: raise it to {scene.cycles.max_bounces}, the "
+            "scene's own"
+        )
 
 
 def check_no_volume(world: bpy.types.World) -> None:
@@ -115,14 +150,10 @@ def differs_by_rays(world: bpy.types.World) -> str:
     if 0 < len(seen) < len(_KINDS):
         hidden = " and ".join(k for k in _KINDS if k not in seen)
         return f"hidden from {hidden} rays: all rays see it alike here"
-    for tree in trees(shader_tree(world), set()):
-        for node in tree.nodes:
-            if node.bl_idname != "ShaderNodeLightPath":
-                continue
-            for socket in node.outputs:
-                if socket.is_linked and socket.name not in _OF_CAMERA:
-                    return (
-                        f"mixed by '{socket.name}': all rays see what a ray through clear glass "
-                        "sees here"
-                    )
+    for node in reached(world):
+        if node.bl_idname != "ShaderNodeLightPath":
+            continue
+        for name in gives(node):
+            if name not in _OF_CAMERA:
+                return f"mixed by '{name}': all rays see what a ray through clear glass sees here"
     return ""

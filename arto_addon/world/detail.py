@@ -6,7 +6,7 @@ import math
 
 import bpy
 
-from ..blender.nodes import shader_tree, trees
+from ..blender.reached import gives, reached
 
 # The width of a map in which a lamp of a tenth of a degree is about two texels wide. Nodes that may
 # draw anything count as this fine, and no world counts as finer.
@@ -73,6 +73,11 @@ def _above(node: bpy.types.Node, ends: set[str]) -> set[bpy.types.Node]:
     return found
 
 
+def _is_value(node: bpy.types.Node) -> bool:
+    of_layer = node.bl_idname == "ShaderNodeAttribute" and node.attribute_type == "VIEW_LAYER"
+    return of_layer or node.bl_idname in _VALUES
+
+
 def values_only(node: bpy.types.Node, ends: set[bpy.types.Node]) -> bool:
     """Whether no node that leads to a node depends on a direction; the search stops at `ends`."""
     found: set[bpy.types.Node] = set()
@@ -83,7 +88,7 @@ def values_only(node: bpy.types.Node, ends: set[bpy.types.Node]) -> bool:
                 if link.from_node not in found | ends:
                     found.add(link.from_node)
                     todo.append(link.from_node)
-    return all(n.bl_idname in _VALUES for n in found)
+    return all(_is_value(n) for n in found)
 
 
 def _of_texture(node: bpy.types.Node) -> int:
@@ -111,21 +116,20 @@ def detail(world: bpy.types.World) -> int:
     """
     widest = 1
     textures = {"ShaderNodeTexEnvironment", "ShaderNodeTexSky"}
-    for tree in trees(shader_tree(world), set()):
-        for node in tree.nodes:
-            kind = node.bl_idname
-            if node.outputs and not any(s.is_linked for s in node.outputs):
-                continue
-            if kind == "ShaderNodeTexEnvironment":
-                widest = max(widest, _of_texture(node))
-            elif kind == "ShaderNodeTexSky":
-                # Two texels across the sun.
-                sun = math.degrees(node.sun_size) if node.sun_disc else 1.0
-                widest = max(widest, math.ceil(2 * 360 / max(sun, 1e-3)))
-            elif kind in _STRUCTURE:
-                continue
-            elif kind not in _VALUES or any(
-                n.bl_idname not in _VALUES | textures for n in _above(node, textures)
-            ):
-                return FINEST
+    for node in reached(world):
+        kind = node.bl_idname
+        if node.outputs and not gives(node):
+            continue
+        if kind == "ShaderNodeTexEnvironment":
+            widest = max(widest, _of_texture(node))
+        elif kind == "ShaderNodeTexSky":
+            # Two texels across the sun.
+            sun = math.degrees(node.sun_size) if node.sun_disc else 1.0
+            widest = max(widest, math.ceil(2 * 360 / max(sun, 1e-3)))
+        elif kind in _STRUCTURE:
+            continue
+        elif not _is_value(node) or any(
+            not _is_value(n) and n.bl_idname not in textures for n in _above(node, textures)
+        ):
+            return FINEST
     return min(widest, FINEST)

@@ -18,6 +18,7 @@ import bpy
 from ...core.errors import SceneError
 from ..blender.nodes import shader_tree, trees
 from .detail import values_only
+from .still import still
 
 # The names of the nodes that are added.
 TURN, STRENGTH, PLACE = "ARTO Turn", "ARTO Strength", "ARTO Place"
@@ -237,25 +238,14 @@ def read(world: bpy.types.World) -> tuple[float, float, list[bpy.types.Node]]:
 
 
 @contextmanager
-def _still_copy(world: bpy.types.World) -> Iterator[bpy.types.World]:
-    """Copy a world as it is now, without its animation; the copy is removed at the end."""
-    copy = world.copy()
-    try:
-        for block in (copy, copy.node_tree):
-            if block:
-                block.animation_data_clear()
-        yield copy
-    finally:
-        bpy.data.worlds.remove(copy)
-
-
-@contextmanager
-def without_dials(world: bpy.types.World) -> Iterator[tuple[bpy.types.World, float, float]]:
+def without_dials(
+    scene: bpy.types.Scene, view_layer: str, world: bpy.types.World
+) -> Iterator[tuple[bpy.types.World, float, float]]:
     """Copy a world as it is now, with a strength of 1 and a turn of 0 -> (copy, strength, turn).
 
-    The copy is removed at the end.
+    The copy stands still (`still`), and is removed at the end.
     """
-    with _still_copy(world) as plain:
+    with still(scene, view_layer, world) as plain:
         strength, turn, _ = read(plain)
         background, mapping = whole(plain)
         if background:
@@ -266,13 +256,15 @@ def without_dials(world: bpy.types.World) -> Iterator[tuple[bpy.types.World, flo
 
 
 @contextmanager
-def turned(world: bpy.types.World, angle: float) -> Iterator[bpy.types.World]:
-    """Copy a world and turn the copy about the vertical, as the slider would.
+def turned(
+    scene: bpy.types.Scene, view_layer: str, world: bpy.types.World, angle: float
+) -> Iterator[bpy.types.World]:
+    """Copy a world as it is now and turn the copy about the vertical, as the slider would.
 
     angle: in radians, added to the world's turn. The copy is removed at the end. Raises SceneError
     for a world that cannot be turned.
     """
-    with _still_copy(world) as copy:
+    with still(scene, view_layer, world, camera=False) as copy:
         if why := why_not_turned(copy):
             raise SceneError(
                 f"the world '{world.name}' cannot be turned ({why[0].lower()}{why[1:]}): add one "

@@ -22,12 +22,16 @@ from ..blender.colour import working_space
 from ..blender.nodes import shader_tree, trees
 from ..shot import paths
 from ..shot.fingerprint import of_blocks
+from ..shot.shot import layer_of
 from .bake import bake
 from .check import check_world
 from .dials import read, without_dials
+from .images import moves, stamps
+from .still import context
+from .studio import of_textures
 
 # The version of how maps are made. Maps of another version are not used.
-VERSION = 1
+VERSION = 2
 # How many maps stay on disk: those that were used last.
 MOST = 12
 # The last map also stays in memory up to so many bytes, as a turntable needs only this map.
@@ -46,13 +50,14 @@ def environment(
     world: the world to show (default: the view layer's). Raises what `bake` raises.
     """
     world = world or check_world(scene, view_layer)
-    with without_dials(world) as (plain, strength, turn):
+    layer = view_layer or layer_of(scene)
+    with without_dials(scene, layer, world) as (plain, strength, turn):
         path = paths.worlds_folder(scene) / f"{_key(scene, plain, width)}.npy"
         if _last.get("key") == (path, strength):
             return Environment(_last["image"], turn)
         image = _read(path, width)
         if image is None:
-            image = bake(scene, width, view_layer, plain).image
+            image = bake(scene, width, layer, plain).image
             _write(path, image)
     image = image * np.float32(strength)
     _last.clear()
@@ -69,7 +74,7 @@ def painted(
     The map fits the world's `environment` before its turn. mask: an image that is mapped to the sky
     as the HDRI is. Raises SceneError unless the world's own tree has exactly one HDRI.
     """
-    with without_dials(world) as (plain, _, _):
+    with without_dials(scene, layer_of(scene), world) as (plain, _, _):
         found = [n for t in trees(shader_tree(plain), set()) for n in t.nodes]
         textures = [n for n in found if n.bl_idname == "ShaderNodeTexEnvironment" and n.image]
         if len(textures) != 1 or textures[0].id_data != plain.node_tree:
@@ -108,24 +113,15 @@ def _write(path: Path, image: np.ndarray) -> None:
 def _key(scene: bpy.types.Scene, world: bpy.types.World, width: int) -> str:
     """The key of a map: a digest of all that the map depends on."""
     of: list[object] = [VERSION, width, bpy.app.version_string, working_space()]
+    of.append(of_textures(scene))
     # `full` reads the files: an HDRI may be replaced by a file of the same size and time.
     found = of_blocks([world], full=True)
     # The world's name does not count, as a copy of the world has another name.
     of.append(sorted(("World" if k.startswith("World") else k, v) for k, v in found.items()))
-    if moving_images(world):
+    of.append(stamps(world, scene.frame_current))
+    if moves(world):
         of.append((scene.frame_current, scene.frame_subframe))
     return hashlib.sha256(repr(of).encode()).hexdigest()[:16]
-
-
-def moving_images(world: bpy.types.World) -> bool:
-    """Whether a world shows a sequence or a movie."""
-    return any(
-        node.bl_idname == "ShaderNodeTexEnvironment"
-        and node.image
-        and node.image.source in {"SEQUENCE", "MOVIE"}
-        for tree in trees(shader_tree(world), set())
-        for node in tree.nodes
-    )
 
 
 def shows(scene: bpy.types.Scene, world: bpy.types.World) -> tuple[str, float, float]:
@@ -135,6 +131,7 @@ def shows(scene: bpy.types.Scene, world: bpy.types.World) -> tuple[str, float, f
     """
     strength, turn, dials = read(world)
     of: list[object] = [*sorted(of_blocks([world], without=dials).items())]
-    if moving_images(world):
-        of.append((scene.frame_current, scene.frame_subframe))
+    of += [of_textures(scene), *context(scene, layer_of(scene), world)]
+    if moves(world):
+        of += [stamps(world, scene.frame_current), scene.frame_current, scene.frame_subframe]
     return repr(of), strength, turn

@@ -18,7 +18,7 @@ from ...core.errors import FieldError, SceneError
 from ...core.field.field import Field
 from ...core.light.environment import Environment
 from ..blender.colour import working_space
-from ..blender.nodes import new_world
+from ..blender.nodes import dark_world
 from ..stage.bounds import rendered
 from ..stage.settings import prepare
 from ..stage.small import parts_of, small
@@ -38,11 +38,13 @@ def world_showing(on: Stage, shown: Environment, group: str = "") -> bpy.types.W
     rgba[..., :3] = shown.image[::-1]
     image.pixels.foreach_set(rgba.ravel())
     image.update()
-    world = on.made(new_world("ARTO Lamps"))
+    world = on.made(dark_world(on.scene.world, "ARTO Lamps"))
     nodes = world.node_tree.nodes
     texture = nodes.new("ShaderNodeTexEnvironment")
     texture.image = image
-    world.node_tree.links.new(texture.outputs["Color"], nodes["Background"].inputs["Color"])
+    light, out = nodes.new("ShaderNodeBackground"), nodes.new("ShaderNodeOutputWorld")
+    world.node_tree.links.new(texture.outputs["Color"], light.inputs["Color"])
+    world.node_tree.links.new(light.outputs[0], out.inputs["Surface"])
     if shown.turn:
         mapping = nodes.new("ShaderNodeMapping")
         mapping.inputs["Rotation"].default_value = (0, 0, shown.turn)
@@ -52,6 +54,7 @@ def world_showing(on: Stage, shown: Environment, group: str = "") -> bpy.types.W
     world.lightgroup = group
     # Cycles' automatic choice takes a second for a map of 4096. A sampling map twice as fine as the
     # light also finds the blended rims of the light's texels.
+    world.cycles.max_bounces = 1024
     world.cycles.sampling_method = "MANUAL"
     world.cycles.sample_map_resolution = 2 * width
     return world

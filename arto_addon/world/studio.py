@@ -6,6 +6,7 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -14,6 +15,22 @@ from numpy.typing import NDArray
 from ...core import exr
 from ..blender.output import float_exr, write_to
 from ..work import Render, blocking_render
+
+# Cycles' settings that change how textures and shaders look.
+_TEXTURES = ("shading_system", "texture_limit_render", "texture_resolution_render")
+
+
+def of_textures(scene: bpy.types.Scene) -> list[object]:
+    """The settings of a scene that change how textures and shaders look to its renders."""
+    return [scene.render.use_simplify, *(getattr(scene.cycles, n, None) for n in _TEXTURES)]
+
+
+def like_textures(scene: bpy.types.Scene, settings: list[Any]) -> None:
+    """Set on another scene what `of_textures` has read."""
+    scene.render.use_simplify = settings[0]
+    for name, value in zip(_TEXTURES, settings[1:], strict=True):
+        if hasattr(scene.cycles, name):
+            setattr(scene.cycles, name, value)
 
 
 @contextmanager
@@ -35,6 +52,7 @@ def studio_scene(
         studio.world.cycles.sampling_method = "NONE"
         studio.frame_set(scene.frame_current, subframe=scene.frame_subframe)
         studio.cycles.device = scene.cycles.device
+        like_textures(studio, of_textures(scene))
         studio.cycles.use_denoising = False
         studio.cycles.use_adaptive_sampling = False
         studio.render.resolution_percentage = 100

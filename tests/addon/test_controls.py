@@ -185,14 +185,17 @@ def test_a_mapping_node_before_a_group_turns_what_is_in_it(scene) -> None:
     group.node_tree = inner
     tree.links.new(group.outputs[0], tree.nodes["Background"].inputs["Color"])
     assert "node group" in dials.why_not_turned(world)
-    with pytest.raises(SceneError, match="node group"), dials.turned(world, 1.0):
+    with (
+        pytest.raises(SceneError, match="node group"),
+        dials.turned(scene, scene.view_layers[0].name, world, 1.0),
+    ):
         pass
     mapping, place = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexCoord")
     tree.links.new(place.outputs["Generated"], mapping.inputs["Vector"])
     tree.links.new(mapping.outputs[0], group.inputs[0])
     before = _baked(scene)
     expected = np.roll(before, WIDTH // 4, axis=1)
-    with dials.turned(world, math.pi / 2) as copy:
+    with dials.turned(scene, scene.view_layers[0].name, world, math.pi / 2) as copy:
         found = bake(scene, WIDTH, None, copy).image
     np.testing.assert_allclose(found, expected, atol=0.03 * before.max())
     world.arto.rotation = math.pi / 2

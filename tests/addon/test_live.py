@@ -266,7 +266,7 @@ def test_maps_are_those_of_a_relight(scene) -> None:
             assert not made.trouble, made.trouble
             assert time.monotonic() < until
             time.sleep(0.05)
-        with without_dials(scene.world) as (plain, _, _):
+        with without_dials(scene, scene.view_layers[0].name, scene.world) as (plain, _, _):
             expected = kept.environment(scene, 128, None, plain).image
         np.testing.assert_array_equal(made.get(key, True), expected)
     finally:

@@ -1,0 +1,80 @@
+"""The images that a world shows, and the files that they are read from at a frame."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import bpy
+
+from ..blender.reached import reached
+
+# Nodes that show an image, and of them those that a frame moves on.
+_SHOW = {"ShaderNodeTexEnvironment", "ShaderNodeTexImage"}
+_MOVE = {"SEQUENCE", "MOVIE"}
+
+
+def image_nodes(world: bpy.types.World) -> list[bpy.types.Node]:
+    """The nodes that show an image and lead to a world's output."""
+    return [node for node in reached(world) if node.bl_idname in _SHOW]
+
+
+def moves(world: bpy.types.World) -> bool:
+    """Whether a world shows a sequence or a movie."""
+    return any(n.image and n.image.source in _MOVE for n in image_nodes(world))
+
+
+def number_at(user: bpy.types.ImageUser, frame: int) -> int:
+    """The number of the image that a node shows at a frame, as Blender counts.
+
+    Before its first image a sequence shows the one before it, and after the last it stays, unless
+    it begins anew.
+    """
+    length = user.frame_duration
+    if length == 0:
+        return 0
+    at = frame - user.frame_start + 1
+    at = (at % length or length) if user.use_cyclic else min(max(at, 0), length)
+    return at + user.frame_offset
+
+
+def files_at(node: bpy.types.Node, frame: int) -> list[Path]:
+    """The files that a node's image is read from at a frame; none where it is in no file."""
+    image = node.image
+    if image is None or image.packed_files or image.source not in {"FILE", "TILED", *_MOVE}:
+        return []
+    path = Path(bpy.path.abspath(image.filepath, library=image.library))
+    if image.source == "SEQUENCE":
+        return [_numbered(path, number_at(node.image_user, frame))]
+    if image.source == "TILED":
+        return [path.with_name(_of_tile(path.name, tile.number)) for tile in image.tiles]
+    return [path]
+
+
+def _numbered(path: Path, number: int) -> Path:
+    """The file of a sequence with a number: the last digits before the ending are the number."""
+    found = list(re.finditer(r"\d+", path.stem))
+    if not found:
+        return path
+    last = found[-1]
+    before, after = path.stem[: last.start()], path.stem[last.end() :]
+    return path.with_name(f"{before}{number:0{len(last[0])}d}{after}{path.suffix}")
+
+
+def _of_tile(name: str, number: int) -> str:
+    u, v = (number - 1001) % 10 + 1, (number - 1001) // 10 + 1
+    return name.replace("<UDIM>", str(number)).replace("<UVTILE>", f"u{u}_v{v}")
+
+
+def stamps(world: bpy.types.World, frame: int) -> list[object]:
+    """What says of the files of a world's sequences whether they are the same as before."""
+    found: list[object] = []
+    for node in image_nodes(world):
+        if node.image and node.image.source in {"TILED", *_MOVE}:
+            for path in files_at(node, frame):
+                try:
+                    s = path.stat()
+                    found.append((str(path), s.st_size, s.st_mtime_ns, s.st_ctime_ns, s.st_ino))
+                except OSError as e:  # The file cannot be read, and the stamp says so.
+                    found.append((str(path), type(e).__name__))
+    return found
