@@ -21,8 +21,8 @@ from .world.own import sync
 CAPTURED, FITTED = 0.9, 0.95
 
 
-def shoot(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
-    """Capture, fit and relight; returns a tuple: the path of the plate, None without a world.
+def shoot(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps[Path | None]:
+    """Capture, fit and relight; returns the path of the plate, None without a world.
 
     The scene does not change. Raises what the three steps raise; finished steps are kept.
     """
@@ -31,16 +31,16 @@ def shoot(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     yield from part_of(fit(scene, layer), CAPTURED, FITTED - CAPTURED)
     if world_of(scene, layer) is None:
         yield Progress(1.0, "captured: add a world with an HDRI to see the shot in its light")
-        return (None,)
+        return None
     path, _ = yield from part_of(compute(scene, layer), FITTED, 1 - FITTED)
-    return (Path(path),)
+    return path
 
 
-def shoot_and_show(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
+def shoot_and_show(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps[Path | None]:
     """Shoot, then put the plate into the compositor and the lamps' groups into the panel."""
     layer = view_layer or layer_of(scene)
-    (path,) = yield from shoot(scene, layer)
+    path = yield from shoot(scene, layer)
     sync(scene, Field(paths.field_folder(scene, layer)))
     if path is not None:
         present(scene, path)
-    return (path,)
+    return path

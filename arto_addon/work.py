@@ -47,7 +47,8 @@ class Render:
 _Step = TypeVar("_Step")
 _Other = TypeVar("_Other")
 _Made = TypeVar("_Made")
-Steps = Generator[Progress | Render, None, Any]
+# A piece of work, and what it returns: `Steps[Path]`.
+Steps = Generator[Progress | Render, None, _Made]
 
 
 def _last_properties() -> Any:
@@ -120,7 +121,7 @@ def driven(steps: Generator[_Step, None, _Made], do: Callable[[_Step], None]) ->
         steps.close()
 
 
-def part_of(steps: Steps, begin: float, span: float, title: str = "") -> Steps:
+def part_of(steps: Steps[_Made], begin: float, span: float, title: str = "") -> Steps[_Made]:
     """Pass on the steps of a part of a larger work: their shares run from `begin` over `span`.
 
     title: put before the text of each step.
@@ -135,7 +136,7 @@ def part_of(steps: Steps, begin: float, span: float, title: str = "") -> Steps:
     return retold(steps, change)
 
 
-def run(steps: Steps, say: Callable[[Progress | Render], None] | None = None) -> Any:
+def run(steps: Steps[_Made], say: Callable[[Progress | Render], None] | None = None) -> _Made:
     """Drive the work to its end, renders included; returns what the work returns.
 
     say: called with each step.

@@ -145,12 +145,12 @@ def snapshot(size: Size, folder: Path) -> list[Row]:
 def probe(size: Size, folder: Path) -> list[Row]:
     """All that comes before the first long render; it does not hang on the size."""
     from arto.arto_addon import work
-    from arto.arto_addon.capture.capture import capture
+    from arto.arto_addon.capture.capture import estimate
 
     scene = _scene(size, folder)
-    steps = capture(scene, scene.view_layers[0].name, only_estimate=True)
-    seconds, estimate = timed(lambda: work.run(steps))
-    return [{"stage": "probe", "seconds": seconds, "estimate": estimate.to_json()}]
+    steps = estimate(scene, scene.view_layers[0].name)
+    seconds, found = timed(lambda: work.run(steps))
+    return [{"stage": "probe", "seconds": seconds, "estimate": found.to_json()}]
 
 
 def capture_and_fit(size: Size, folder: Path) -> list[Row]:

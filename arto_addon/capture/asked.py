@@ -139,7 +139,7 @@ def asked(
 
 def begun(
     this: Asked, folder: Path, given: Given | None, strips: int | None = None, takes: int = 1
-) -> Steps:
+) -> Steps[tuple[Planned, CaptureHead]]:
     """Look at the scene and plan the capture -> (`Planned`, the head of its capture set).
 
     The head has no rendered tile yet.
@@ -148,7 +148,7 @@ def begun(
     memory makes necessary); takes: see `planned`. Raises SceneError.
     """
     settings = this.scene.arto
-    plan: Planned = yield from planned(
+    plan = yield from planned(
         this.scene, this.on, this.hemicube, this.region, this.grain, folder, given, strips, takes
     )
     head = replace(

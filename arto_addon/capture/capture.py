@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,11 +27,12 @@ from ..stage import takes
 from ..stage.stage import Stage, set_region
 from ..work import Progress, Render, Steps
 from . import beside, planes
-from .asked import asked, begun
+from .asked import Asked, asked, begun
 from .check import check_scene
 from .plan import render_plan
-from .planned import Given
+from .planned import Given, Planned
 from .resume import empty, empty_take, finish, finish_field, let_go, unfinished
+from .room import Estimate
 from .stream import Stream
 
 
@@ -52,9 +53,8 @@ def check_file(path: Path, images: list[tuple[int, str]]) -> None:
 def capture(
     scene: bpy.types.Scene,
     view_layer: str,
-    only_estimate: bool = False,
     given: Given | None = None,
-) -> Steps:
+) -> Steps[Path]:
     """Render the basis images of a scene into its capture set; returns the folder.
 
     Where the settings keep no basis images, each tile is fitted as it comes, and the new field
@@ -63,10 +63,26 @@ def capture(
     other settings. The scene does not change, except that it may be given the ID that its shots are
     found by.
 
-    only_estimate: stop before the first long render, and return the `room.Estimate`; given: see
-    `Given`. Raises SceneError, CaptureSetError, FieldError, PatternError, BusyError (another
-    process captures this shot), ExrError, CancelledError.
+    given: see `Given`. Raises SceneError, CaptureSetError, FieldError, PatternError, BusyError
+    (another process captures this shot), ExrError, CancelledError.
     """
+    with _claimed(scene, view_layer) as place:
+        return (yield from _capture(scene, view_layer, place, given))
+
+
+def estimate(scene: bpy.types.Scene, view_layer: str) -> Steps[Estimate]:
+    """Plan a capture, without its long renders -> what the capture will take.
+
+    Raises what `capture` raises.
+    """
+    with _claimed(scene, view_layer) as place, asked(scene, view_layer) as this:
+        plan, _ = yield from _begun(this, paths.unfinished_folder(place, this.key))
+        return plan.estimate
+
+
+@contextmanager
+def _claimed(scene: bpy.types.Scene, view_layer: str) -> Iterator[Path]:
+    """Check the scene, and hold the lock of its shot's own folder -> the folder."""
     check_scene(scene, view_layer)
     # let the scene follow what a script has moved
     scene.view_layers[view_layer].update()
@@ -74,25 +90,21 @@ def capture(
         check_choice(scene.arto.support, pattern_set(scene.arto.patterns), scene.arto.separate)
     claimed = paths.claim(scene, view_layer)
     with Lock(claimed, f"capturing {shot_of(scene, view_layer).title}"):
-        return (yield from _capture(scene, view_layer, claimed, only_estimate, given))
+        yield claimed
 
 
 def _capture(
     scene: bpy.types.Scene,
     view_layer: str,
     claimed: Path,
-    only_estimate: bool,
     given: Given | None,
-) -> Steps:
+) -> Steps[Path]:
     with asked(scene, view_layer, given) as this:
         folder = paths.unfinished_folder(claimed, this.key)
         head = unfinished(folder, this.key)
         stopped = head is not None
-        if head is None or only_estimate:
-            count = 1 + len(takes.TAKES) * this.catchers
-            plan, head = yield from begun(this, folder, given, takes=count)
-            if only_estimate:
-                return plan.estimate
+        if head is None:
+            _, head = yield from _begun(this, folder, given)
             empty(folder)
         head = yield from _render_tiles(this.on, folder, head)
     made = [(folder, claimed, head)]
@@ -113,6 +125,13 @@ def _capture(
     return claimed / "capture"
 
 
+def _begun(
+    this: Asked, folder: Path, given: Given | None = None
+) -> Steps[tuple[Planned, CaptureHead]]:
+    """Plan the first of a shot's takes, and count in what the takes beside it need."""
+    return begun(this, folder, given, takes=1 + len(takes.TAKES) * this.catchers)
+
+
 def _capture_beside(
     scene: bpy.types.Scene,
     view_layer: str,
@@ -120,7 +139,7 @@ def _capture_beside(
     name: Take,
     first: CaptureHead,
     stopped: bool,
-) -> Steps:
+) -> Steps[tuple[Path, Path, CaptureHead] | None]:
     """Render a take beside the first -> (its folder, the place to put it, its head).
 
     first: the first take's head; stopped: whether this goes on with a capture that was stopped. In
@@ -140,7 +159,9 @@ def _capture_beside(
     return folder, place, head
 
 
-def _finish(scene: bpy.types.Scene, unfinished: Path, place: Path, head: CaptureHead) -> Steps:
+def _finish(
+    scene: bpy.types.Scene, unfinished: Path, place: Path, head: CaptureHead
+) -> Steps[None]:
     """Put a complete take in the last one's place; its field, if tiles were fitted as they came."""
     if not head.kept:
         finish_field(unfinished, place / "field", head)
@@ -148,7 +169,7 @@ def _finish(scene: bpy.types.Scene, unfinished: Path, place: Path, head: Capture
     finish(unfinished, place / "capture")
 
 
-def _render_tiles(on: Stage, folder: Path, head: CaptureHead) -> Steps:
+def _render_tiles(on: Stage, folder: Path, head: CaptureHead) -> Steps[CaptureHead]:
     """Render the missing tiles of a capture set -> the head of the complete set.
 
     Where the settings keep no images, the tiles are fitted as well.
@@ -211,7 +232,7 @@ def set_tile(
     return planes.lit(on, head.hemicube, head.patterns, images, sampled, own)
 
 
-def render_tile(on: Stage, head: CaptureHead, number: int, folder: Path) -> Steps:
+def render_tile(on: Stage, head: CaptureHead, number: int, folder: Path) -> Steps[list[str]]:
     """Render the missing files of a tile into a folder -> the names of all its files."""
     plan, tiles = plan_of(head), len(head.tiles)
     total = len(plan) * tiles
@@ -246,7 +267,7 @@ def _render(
     images: list[tuple[int, str]],
     path: Path,
     request: Render,
-) -> Steps:
+) -> Steps[None]:
     """Render some basis images into `path`. around: puts their planes around the stage."""
     with whole(path) as partial:
         write_to(on.scene.render, partial)

@@ -11,6 +11,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.capture.agreement import DIFFERENT, SUSPECTED, Agreement, Caution, agreement
 from ...core.capture.names import combined
@@ -29,7 +30,7 @@ SAMPLES = 48
 HEIGHT = 256
 
 
-def check_light(on: Stage, hemicube: Hemicube) -> Steps:
+def check_light(on: Stage, hemicube: Hemicube) -> Steps[tuple[bool, Caution | None]]:
     """Compare the light of the prepared stage's patches with a white world's.
 
     -> (whether the patches must be sampled, a `Caution` or None). Some light reaches the picture by
@@ -74,7 +75,7 @@ def check_light(on: Stage, hemicube: Hemicube) -> Steps:
     return sampled, Caution(text, seen.ratio, seen.worst, seen.share, seen.dark)
 
 
-def _of_patches(on: Stage, hemicube: Hemicube, own: np.ndarray, sampled: bool) -> Steps:
+def _of_patches(on: Stage, hemicube: Hemicube, own: np.ndarray, sampled: bool) -> Steps[NDArray]:
     """Render the picture in the light of all patches and the scene's own lights, (H, W, 3)."""
     total = own
     images = [(k, "white") for k in range(len(hemicube))]

@@ -68,7 +68,7 @@ def planned(
     given: Given | None,
     strips: int | None = None,
     takes: int = 1,
-) -> Steps:
+) -> Steps[Planned]:
     """Look at the scene by small renders and plan a capture -> `Planned`.
 
     strips: the number of tiles of the picture (default: as many as memory makes necessary); takes:
@@ -118,7 +118,7 @@ def planned(
     return Planned(hemicube, route, grain, kept, caution, tiles, estimate)
 
 
-def light_route(on: Stage, hemicube: Hemicube) -> Steps:
+def light_route(on: Stage, hemicube: Hemicube) -> Steps[tuple[Route, Caution | None]]:
     """Choose how light gets to the patches -> (route, the `Caution` of `check_light` or None)."""
     settings = on.scene.arto
     if not settings.far:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.capture.names import GROUP
 from ...core.capture.refine import check, refine
@@ -20,7 +21,7 @@ from . import planes
 SAMPLES = 32
 
 
-def refined(on: Stage, hemicube: Hemicube, most: int) -> Steps:
+def refined(on: Stage, hemicube: Hemicube, most: int) -> Steps[Hemicube]:
     """Render a probe of the prepared stage and refine the hemicube with it -> Hemicube.
 
     Raises CancelledError, CaptureSetError, ExrError, HemicubeError; the stage is left as it was.
@@ -29,7 +30,7 @@ def refined(on: Stage, hemicube: Hemicube, most: int) -> Steps:
     return refine(hemicube, found, SAMPLES, most)
 
 
-def probed(on: Stage, hemicube: Hemicube) -> Steps:
+def probed(on: Stage, hemicube: Hemicube) -> Steps[NDArray]:
     """Render a probe of the prepared stage -> (F * 16 * 16, h, w, 3), for `refine`.
 
     Raises what `refined` raises.

@@ -40,7 +40,9 @@ def frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
         scene.frame_set(frame, subframe=part)
 
 
-def capture_frames(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> Steps:
+def capture_frames(
+    scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]
+) -> Steps[list[Path]]:
     """Capture some frames of a shot, each with its field; returns their folders.
 
     Finished frames are captured again; a frame that was stopped goes on (`capture`). The scene is
@@ -60,7 +62,7 @@ def capture_frames(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int
     return folders
 
 
-def together(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> Steps:
+def together(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> Steps[Given]:
     """Find the patches for all frames -> `Given`."""
     some = sorted({frames[0], frames[len(frames) // 2], frames[-1]})
     low, high = np.full(3, np.inf), np.full(3, -np.inf)

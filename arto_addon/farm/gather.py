@@ -33,7 +33,7 @@ from .head import Part
 from .job import Job
 
 
-def gather(job_folder: Path) -> Steps:
+def gather(job_folder: Path) -> Steps[list[Path]]:
     """Join the parts of a job; returns the folders of the frames' fields.
 
     The fields of each frame and of its takes replace those of the shot. Images of several seeds are
@@ -131,7 +131,7 @@ def _found(job: Job, part: Part, captured: CaptureSet) -> Found | None:
     return Found(job.folder / "parts", tuple(files), job.samples_of(captured.head))
 
 
-def _joined(job: Job, frame: int, take: Take, parts: dict[Part, Found]) -> Steps:
+def _joined(job: Job, frame: int, take: Take, parts: dict[Part, Found]) -> Steps[None]:
     """Move the parts of a take into its capture set, tile by tile, and fit unfitted tiles."""
     folder = job.set_folder(frame, take)
     head = job.set_of(frame, take).head
@@ -195,7 +195,7 @@ def _take_field(source: Path, field: Path, name: str) -> None:
             (here / name).replace(there / name)
 
 
-def _fit(captured: CaptureSet, tile: int, tiles: int) -> Steps:
+def _fit(captured: CaptureSet, tile: int, tiles: int) -> Steps[dict]:
     """Fit a tile of a set into `field` in the set's folder -> the tile's entry in `field.json`."""
     steps = fit_into(captured, tile, captured.folder / Stream.FIELD)
     return retold(
@@ -203,7 +203,7 @@ def _fit(captured: CaptureSet, tile: int, tiles: int) -> Steps:
     )
 
 
-def _placed(scene: bpy.types.Scene, folder: Path, place: Path) -> Steps:
+def _placed(scene: bpy.types.Scene, folder: Path, place: Path) -> Steps[None]:
     """Replace the shot's last capture set and field by the complete new set and its field."""
     try:
         place.mkdir(exist_ok=True)

@@ -31,7 +31,7 @@ from .head import Part, PartHead, write_part
 from .job import Job, estimate
 
 
-def render_part(job_folder: Path, number: int) -> Steps:
+def render_part(job_folder: Path, number: int) -> Steps[Path]:
     """Render a part of a job, unless it is there already; returns the part's folder.
 
     A part is there as a whole or not at all; a part whose process was killed is rendered again.
@@ -78,7 +78,7 @@ def render_part(job_folder: Path, number: int) -> Steps:
     return folder
 
 
-def save_part(job_folder: Path, number: int) -> Steps:
+def save_part(job_folder: Path, number: int) -> Steps[Path]:
     """Save a part as .blend files for a Blender without ARTO, one for each render of the part.
 
     Returns the first file. `gather` finds the pictures that the files render to. Raises what
@@ -176,7 +176,7 @@ def _differences(this: Asked, head: CaptureHead) -> list[str]:
     return out
 
 
-def _fitted(captured: CaptureSet, part: Part, folder: Path, files: list[str]) -> Steps:
+def _fitted(captured: CaptureSet, part: Part, folder: Path, files: list[str]) -> Steps[dict]:
     """Fit a part's tile into the part's folder -> the tile's entry in `field.json`."""
     head = captured.head.with_tile(part.tile, files=tuple(files))
     rendered = CaptureSet(folder, unfinished=True, head=head)

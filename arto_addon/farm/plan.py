@@ -15,6 +15,7 @@ import bpy
 from ...core import marked
 from ...core.capture import head as capture_heads
 from ...core.capture.head import CaptureHead
+from ...core.capture.kinds import Take
 from ...core.errors import CaptureSetError, FarmError
 from ...core.fit.choice import check as check_choice
 from ...core.patterns import pattern_set
@@ -39,7 +40,7 @@ def plan(
     frames: Sequence[int] | None,
     tiles: int | None,
     seeds: int,
-) -> Steps:
+) -> Steps[Path]:
     """Plan a job and write it into a folder, with templates for farms; returns the folder.
 
     frames: default the scene's present frame, with its subframe; tiles: the number for each frame
@@ -146,7 +147,7 @@ def _heads(
     given: Given | None,
     tiles: int | None,
     seeds: int,
-) -> Steps:
+) -> Steps[dict[Take, CaptureHead]]:
     """Plan the takes of a frame -> the heads of their capture sets, by the take's name.
 
     The take of everything comes first.

@@ -28,7 +28,7 @@ def _is_fitted(captured: CaptureSet, folder: Path, choice: str, separate: bool) 
     return then[0] is not None and then == (captured.head.key, choice, separate)
 
 
-def _fit_one(scene: bpy.types.Scene, captured: CaptureSet, target: Path) -> Steps:
+def _fit_one(scene: bpy.types.Scene, captured: CaptureSet, target: Path) -> Steps[None]:
     settings = scene.arto
     work = fit_captured(captured, target, settings.support, settings.separate)
     for share, text in work:
@@ -36,7 +36,7 @@ def _fit_one(scene: bpy.types.Scene, captured: CaptureSet, target: Path) -> Step
     yield from cleaned(scene, target)
 
 
-def fit(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
+def fit(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps[Path]:
     """Fit the scene's capture set to a reflectance field; returns the field's folder.
 
     A shot with shadow catchers gets a field for each take. An old field stays until the new field

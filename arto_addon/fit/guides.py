@@ -35,7 +35,7 @@ def clean(field: Field) -> bool:
 CLEAN = "clean"
 
 
-def cleaned(scene: bpy.types.Scene, folder: Path) -> Steps:
+def cleaned(scene: bpy.types.Scene, folder: Path) -> Steps[None]:
     """Denoise the guides of a new field, so that no relight has to.
 
     Nothing is done where the setting `denoise` is off or this Blender cannot denoise.

@@ -49,8 +49,7 @@ def main(path: Path) -> int:
     code = 0
     try:
         with writer.samples():
-            result = run(_steps(Task.read(path), folder), writer)
-        made = result[0] if isinstance(result, tuple | list) else result
+            made = run(_steps(Task.read(path), folder), writer)
         state = State(1.0, writer.text, end="done", result=str(made or ""))
     except CancelledError as e:
         state, code = State(writer.share, str(e), end="cancelled"), 130
@@ -70,7 +69,7 @@ def main(path: Path) -> int:
     return code
 
 
-def _steps(task: Task, folder: Path) -> Steps:
+def _steps(task: Task, folder: Path) -> Steps[Path | None]:
     home.set_file(task.blend)
     scene = bpy.data.scenes.get(task.scene)
     if scene is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 import bpy
@@ -36,31 +37,40 @@ Verb = Literal[
 class Work:
     """What a verb stands for.
 
-    steps: the work on a scene and a view layer; doing: what the artist is told, before the shot's
+    steps: the work on a scene and a view layer, which returns the file that the window shows, or a
+    folder, or None; doing: what the artist is told, before the shot's
     title; captures: whether the work changes the capture, so that no other process may meanwhile.
     """
 
-    steps: Callable[[bpy.types.Scene, str], Steps]
+    steps: Callable[[bpy.types.Scene, str], Steps[Path | None]]
     doing: str
     captures: bool = False
 
 
-def _capture_frames(scene: bpy.types.Scene, view_layer: str) -> Steps:
-    return capture_frames(scene, view_layer, frames_of(scene))
+def _capture_frames(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
+    return (yield from capture_frames(scene, view_layer, frames_of(scene)))[0]
 
 
-def _relight_frames(scene: bpy.types.Scene, view_layer: str) -> Steps:
-    return relight_many(scene, view_layer, frames=frames_of(scene))
+def _relight(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
+    return (yield from compute(scene, view_layer))[0]
+
+
+def _relight_frames(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
+    return (yield from relight_many(scene, view_layer, frames=frames_of(scene)))[0]
+
+
+def _relight_looks(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
+    return (yield from relight_looks(scene, view_layer))[0]
 
 
 VERBS: Mapping[Verb, Work] = {
     "capture": Work(capture, "capturing", captures=True),
     "fit": Work(fit, "fitting", captures=True),
-    "relight": Work(compute, "relighting"),
+    "relight": Work(_relight, "relighting"),
     "capture_frames": Work(_capture_frames, "capturing the frames of", captures=True),
     "relight_frames": Work(_relight_frames, "relighting the frames of"),
     "shoot": Work(shoot, "capturing", captures=True),
-    "relight_looks": Work(relight_looks, "relighting the looks of"),
+    "relight_looks": Work(_relight_looks, "relighting the looks of"),
     "verify": Work(verify_plate, "verifying the plate of"),
     "composite": Work(save_composite, "compositing"),
 }

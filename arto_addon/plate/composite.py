@@ -26,8 +26,8 @@ def composite_file(scene: bpy.types.Scene) -> Path:
     return plate.with_name(f"{plate.stem}_composite{scene.render.file_extension}")
 
 
-def save_composite(scene: bpy.types.Scene, view_layer: str) -> Steps:
-    """Write what the scene's compositor puts out; returns a tuple with the file's path.
+def save_composite(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
+    """Write what the scene's compositor puts out; returns the file's path.
 
     This is for a job. Compositing replaces the last render, and in a job that is not the artist's.
     Raises SceneError where the scene has no compositor, or where the composite shows a render,
@@ -52,7 +52,7 @@ def save_composite(scene: bpy.types.Scene, view_layer: str) -> Steps:
     finally:
         bpy.data.images.remove(image)
     yield Progress(1.0, f"wrote {path}")
-    return (path,)
+    return path
 
 
 def _composited(scene: bpy.types.Scene) -> NDArray[np.float32]:

@@ -31,7 +31,7 @@ def verify_file(path: Path) -> Path:
     return path.with_name(f"{path.stem}_verify.exr")
 
 
-def verify_plate(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
+def verify_plate(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps[Path]:
     """Render the scene twice with a few samples, and compare the plate with both renders.
 
     Returns the path of a picture that marks where the plate is off by more than noise. The header

@@ -29,7 +29,7 @@ class Made:
     caught: Caught | None
 
 
-def write(shown: Shown, ready: Ready, made: Made, about: dict[str, str]) -> Steps:
+def write(shown: Shown, ready: Ready, made: Made, about: dict[str, str]) -> Steps[None]:
     """Write the plate and the files that the settings ask for beside it.
 
     about: the first entries of each header. Raises SceneError, ExrError.

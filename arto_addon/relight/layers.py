@@ -111,7 +111,7 @@ def lamp_shares(lamps: Environment, parts: dict[str, NDArray[np.float32]]) -> di
     return {name: share for name, share in found.items() if share > LEAST_LAMPS}
 
 
-def of_plate(shot: Shown, ready: Ready) -> Steps:
+def of_plate(shot: Shown, ready: Ready) -> Steps[dict[str, NDArray[np.float32]]]:
     """Make the layers of a plate, (H, W, 3) each, by name.
 
     They are denoised where the plate is. For a shot with shadow catchers, the layers show the
@@ -156,7 +156,7 @@ def write(
     layers: dict[str, NDArray[np.float32]],
     attributes: dict[str, object],
     space: str,
-) -> Steps:
+) -> Steps[None]:
     """Write the layers of a plate: all with the plate in one file, or each in a file of its own.
 
     beauty: the plate, (H, W, 4). The last message says by how much the sum of the layers differs

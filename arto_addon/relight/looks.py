@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -89,12 +89,12 @@ def free_name(scene: bpy.types.Scene, name: str) -> str:
     return found
 
 
-def relight_looks(scene: bpy.types.Scene, view_layer: str) -> Steps:
+def relight_looks(scene: bpy.types.Scene, view_layer: str) -> Steps[list[Path]]:
     """Relight the shot in each of its looks; returns the paths of the plates.
 
     Raises what `relight.compute` raises, SceneError where there are no looks.
     """
-    looks: Sequence[Any] = [look for look in scene.arto.looks if look.world]
+    looks = [look for look in scene.arto.looks if look.world]
     if not looks:
         raise SceneError("there are no looks to relight: add one")
     scene.view_layers[view_layer].update()
@@ -118,7 +118,7 @@ def relight_looks(scene: bpy.types.Scene, view_layer: str) -> Steps:
     return done
 
 
-def show_looks(scene: bpy.types.Scene, view_layer: str) -> Steps:
+def show_looks(scene: bpy.types.Scene, view_layer: str) -> Steps[list[Path]]:
     """Relight the looks as `relight_looks` does, and put each plate into the scene's compositor."""
     done = yield from relight_looks(scene, view_layer)
     for look, path in zip((k for k in scene.arto.looks if k.world), done, strict=True):

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import bpy
 
@@ -28,6 +29,8 @@ from ..world.dials import turned
 from .relight import finish, make_ready
 from .shown import Light, Ready, Shown
 
+_Made = TypeVar("_Made")
+
 
 def relight_many(
     scene: bpy.types.Scene,
@@ -35,7 +38,7 @@ def relight_many(
     worlds: Sequence[Path] = (),
     turns: int = 1,
     frames: Sequence[int] = (),
-) -> Steps:
+) -> Steps[list[Path]]:
     """Show a shot in many lights; returns the paths of the pictures.
 
     worlds: environment maps that replace the scene's world, one after another; turns: the number of
@@ -124,7 +127,7 @@ def _check_frames(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]
     )
 
 
-def _quietly(steps: Steps, share: float) -> Steps:
+def _quietly(steps: Steps[_Made], share: float) -> Steps[_Made]:
     """Run the steps of one picture without their messages, which would be lost among many."""
 
     def change(step: Progress | Render) -> Render | None:
@@ -150,7 +153,9 @@ def _lent(
     return world
 
 
-def relight_frames(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> Steps:
+def relight_frames(
+    scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]
+) -> Steps[list[Path]]:
     """Relight frames and show them as a sequence in the compositor; returns the pictures' paths.
 
     The frames are those of a captured sequence, or of an animated world over a still. Raises what

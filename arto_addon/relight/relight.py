@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -40,7 +41,9 @@ OPAQUE = 1 - 1e-5
 LEAST_SHARE = 1e-3
 
 
-def relight(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
+def relight(
+    scene: bpy.types.Scene, view_layer: str | None = None
+) -> Steps[tuple[Path, dict[str, float]]]:
     """Relight the scene's field with its world and show it: `compute`, then `present.present`.
 
     In the scene only the plate's image and the plate's node in the compositor change. Raises what
@@ -51,7 +54,9 @@ def relight(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     return path, seconds
 
 
-def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
+def compute(
+    scene: bpy.types.Scene, view_layer: str | None = None
+) -> Steps[tuple[Path, dict[str, float]]]:
     """Relight the scene's field with its world; returns (path of the EXR, seconds by part).
 
     The scene does not change. Raises SceneError, CaptureSetError (captured for another camera,
@@ -68,7 +73,7 @@ def compute(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps:
     return path, seconds
 
 
-def show(shown: Shown, lit: Light) -> Steps:
+def show(shown: Shown, lit: Light) -> Steps[dict[str, float]]:
     """Make and write the plate of a field in a light; returns seconds by part of the work.
 
     Raises what `compute` raises.
@@ -78,7 +83,7 @@ def show(shown: Shown, lit: Light) -> Steps:
     return (yield from finish(shown, ready, shown.pictures([ready.light])[0]))
 
 
-def make_ready(shown: Shown, lit: Light) -> Steps:
+def make_ready(shown: Shown, lit: Light) -> Steps[Ready]:
     """Prepare a light: bake its map, render its lamps, bring it to the patches -> `Ready`.
 
     Raises what `compute` raises.
@@ -117,7 +122,9 @@ def make_ready(shown: Shown, lit: Light) -> Steps:
     )
 
 
-def finish(shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]) -> Steps:
+def finish(
+    shown: Shown, ready: Ready, pictures: list[NDArray[np.float32]]
+) -> Steps[dict[str, float]]:
     """Make the plate and write it; returns seconds by part of the work.
 
     pictures: for each take what its field shows in the light, (H, W, 4). Raises what `compute`
@@ -196,7 +203,7 @@ def check_finite(picture: NDArray | float, name: str) -> None:
 
 def _with_own(
     shown: Shown, ready: Ready, picture: NDArray[np.float32], parts: list[NDArray[np.float32]]
-) -> Steps:
+) -> Steps[list[NDArray[np.float32]]]:
     """Add the scene's own lamps to a take's picture -> the pictures that sum to the take's plate.
 
     picture: what the take's field shows, (H, W, 4); parts: pictures of the world's lamps, none or
@@ -211,10 +218,10 @@ def _with_own(
     check_finite(own, f"the scene's own lamps in the field {shown.field.folder}")
     picture[..., :3] += own
     parts = [*parts, picture[..., :3]]
-    return [sum(parts)] if ready.together else parts
+    return [sum(parts, np.zeros_like(picture[..., :3]))] if ready.together else parts
 
 
-def _lamps(shown: Shown, found: Split) -> Steps:
+def _lamps(shown: Shown, found: Split) -> Steps[tuple[list[NDArray[np.float32]], str, bool]]:
     """Render the light of the world's lamps by itself.
 
     -> (pictures, none or one; what was done, in words; whether the lamps have nearly all the light)
@@ -240,7 +247,7 @@ def _lamps(shown: Shown, found: Split) -> Steps:
 
 def _hold(
     shown: Shown, whole: Environment, picture: NDArray[np.float32], parts: list[NDArray]
-) -> Steps:
+) -> Steps[None]:
     """Scale a picture to the mean brightness that a small render in the same light has.
 
     Some light reaches the picture by shadow rays alone. How much of it Cycles gives depends on the

@@ -45,7 +45,9 @@ def small(on: Stage, samples: int) -> Iterator[None]:
             setattr(owner, name, value)
 
 
-def parts_of(on: Stage, text: str, share: float = 0.0, span: float = 0.0) -> Steps:
+def parts_of(
+    on: Stage, text: str, share: float = 0.0, span: float = 0.0
+) -> Steps[dict[str, NDArray]]:
     """Render the stage as it stands -> the render's parts by name, as `exr.read` gives them.
 
     share: how much of the whole work was done before, 0 to 1; span: how much of the whole work this

@@ -10,12 +10,11 @@ import json
 import re
 import sys
 from pathlib import Path
-from typing import Any
 
 import bpy
 
 from ...core.errors import ArtoError, CancelledError
-from ..capture.capture import capture
+from ..capture.capture import capture, estimate
 from ..capture.sequence import capture_frames
 from ..farm.gather import gather
 from ..farm.part import render_part, save_part
@@ -28,9 +27,9 @@ from ..relight.relight import relight
 from ..settings import table
 from ..settings.setting import Setting
 from ..shot import paths
-from ..work import Progress, ProgressLines, Render, run
+from ..work import Progress, ProgressLines, Render, Steps, run
 
-_commands: list[Any] = []
+_commands: list[object] = []
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -116,16 +115,16 @@ def _frames(text: str) -> range:
 
 def _add_option(parser: argparse.ArgumentParser, setting: Setting) -> None:
     """Add an option for a setting, with the setting's kind, choices and description."""
-    option: dict[str, Any] = {"default": None, "help": setting.words.replace("%", "%%")}
+    flag, words = f"--{setting.name.replace('_', '-')}", setting.words.replace("%", "%%")
     if setting.kind in ("choice", "choices"):
-        option["choices"] = [identifier for identifier, _, _ in setting.items]
-        if setting.kind == "choices":
-            option["nargs"] = "+"
+        items = [identifier for identifier, _, _ in setting.items]
+        several = "+" if setting.kind == "choices" else None
+        parser.add_argument(flag, help=words, choices=items, nargs=several)
     elif setting.kind == "switch":
-        option["action"] = argparse.BooleanOptionalAction
+        parser.add_argument(flag, help=words, action=argparse.BooleanOptionalAction)
     else:
-        option["type"] = {"whole": int, "number": float, "text": str}[setting.kind]
-    parser.add_argument(f"--{setting.name.replace('_', '-')}", **option)
+        kind = {"whole": int, "number": float, "text": str}[setting.kind]
+        parser.add_argument(flag, help=words, type=kind)
 
 
 def main(arguments: list[str]) -> int:
@@ -140,7 +139,12 @@ def main(arguments: list[str]) -> int:
     if verb == "maps":
         return maps.serve()
     if verb in ("part", "gather"):
-        return _of_a_farm(verb, options)
+        return _of_a_farm(
+            options["job"].resolve(),
+            None if verb == "gather" else options["number"],
+            openjd=options["openjd"],
+            save_blend=verb == "part" and options["save_blend"],
+        )
     name, layer = options.pop("scene"), options.pop("view_layer")
     scene = bpy.data.scenes.get(name) if name else bpy.context.scene
     if scene is None:
@@ -160,7 +164,7 @@ def main(arguments: list[str]) -> int:
     if options.get("faces"):
         options["faces"] = set(options["faces"])
         options["preset"] = "custom"
-    frames, estimate = options.pop("frames", None), options.pop("estimate", False)
+    frames, only_estimate = options.pop("frames", None), options.pop("estimate", False)
     planned = {name: options.pop(name, None) for name in ("job", "tiles", "seeds")}
     worlds, turns = options.pop("worlds", None), options.pop("turntable", 1)
     for key, value in options.items():
@@ -179,10 +183,11 @@ def main(arguments: list[str]) -> int:
                 return 1
             print(f"ARTO adopt: {paths.adopt(scene, layer, place.source)}")
             return 0
-        if verb == "capture" and estimate:
-            work = capture(scene, layer, only_estimate=True)
-            print(json.dumps(run(work, ProgressLines(verb)).to_json()), flush=True)
+        if verb == "capture" and only_estimate:
+            found = run(estimate(scene, layer), ProgressLines(verb))
+            print(json.dumps(found.to_json()), flush=True)
             return 0
+        work: Steps[object]
         if verb == "plan":
             tiles, seeds = planned["tiles"], planned["seeds"]
             if (tiles is not None and tiles < 1) or seeds < 1:
@@ -210,20 +215,21 @@ def _failed(error: ArtoError) -> int:
     return 130 if isinstance(error, CancelledError) else 1
 
 
-def _of_a_farm(verb: str, options: dict[str, Any]) -> int:
+def _of_a_farm(folder: Path, number: int | None, *, openjd: bool, save_blend: bool) -> int:
     """Render a part of a farm's job, or gather the parts; returns the exit code.
 
-    The settings are those of the job.
+    The settings are those of the job. number: the part's, None to gather.
     """
-    folder = options["job"].resolve()
+    work: Steps[Path | list[Path]]
     try:
-        if verb == "gather":
+        if number is None:
             work = gather(folder)
         else:
-            work = (save_part if options["save_blend"] else render_part)(folder, options["number"])
-        made = run(work, OpenJDLines() if options["openjd"] else ProgressLines(verb))
+            work = (save_part if save_blend else render_part)(folder, number)
+        name = "gather" if number is None else "part"
+        made = run(work, OpenJDLines() if openjd else ProgressLines(name))
     except ArtoError as e:
-        if options["openjd"]:
+        if openjd:
             print(f"openjd_fail: {e}", flush=True)
         return _failed(e)
     for path in made if isinstance(made, list) else [made]:

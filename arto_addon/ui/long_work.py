@@ -16,7 +16,7 @@ class LongWork(bpy.types.Operator):
 
     verb: Verb
 
-    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps[object]:
         raise NotImplementedError
 
     def execute(self, context: bpy.types.Context) -> set[str]:

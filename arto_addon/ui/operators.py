@@ -130,7 +130,7 @@ class ARTO_OT_capture(LongWork):
     def check(self, scene: bpy.types.Scene) -> None:
         check_scene(scene)
 
-    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps[object]:
         return capture(scene, view_layer)
 
 
@@ -147,7 +147,7 @@ class ARTO_OT_fit(LongWork):
             cls, context, "capture", CAPTURE_HEADER, "Capture the scene first"
         )
 
-    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps[object]:
         return fit(scene, view_layer)
 
 
@@ -166,7 +166,7 @@ class ARTO_OT_relight(LongWork):
         check_world(scene)
         relit_file(scene)
 
-    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps[object]:
         return relight(scene, view_layer)
 
 
@@ -184,7 +184,7 @@ class ARTO_OT_capture_frames(LongWork):
     def check(self, scene: bpy.types.Scene) -> None:
         check_scene(scene)
 
-    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps[object]:
         return capture_frames(scene, view_layer, frames_of(scene))
 
 
@@ -207,7 +207,7 @@ whose frames were captured, or of an animated world over a still"""
         check_world(scene)
         relit_file(scene)
 
-    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps[object]:
         return relight_frames(scene, view_layer, frames_of(scene))
 
 

@@ -76,7 +76,7 @@ differs from them by more than their noise"""
     def poll(cls, context: bpy.types.Context) -> bool:
         return free(cls) and _has_plate(cls, context)
 
-    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps[object]:
         return verify_plate(scene, view_layer)
 
 
@@ -92,7 +92,7 @@ without rendering"""
     def poll(cls, context: bpy.types.Context) -> bool:
         return free(cls) and _has_plate(cls, context)
 
-    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps[object]:
         return save_composite(scene, view_layer)
 
 

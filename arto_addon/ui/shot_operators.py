@@ -45,7 +45,7 @@ class ARTO_OT_shoot(LongWork):
     def check(self, scene: bpy.types.Scene) -> None:
         check_scene(scene)
 
-    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps[object]:
         return shoot_and_show(scene, view_layer)
 
 
@@ -179,7 +179,7 @@ class ARTO_OT_relight_looks(LongWork):
             return False
         return free(cls) and can_relight(cls, context)
 
-    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps:
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps[object]:
         return show_looks(scene, view_layer)
 
 

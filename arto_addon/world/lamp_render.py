@@ -71,7 +71,7 @@ def lamp_samples(scene: bpy.types.Scene, share: float) -> int:
 
 def lamp_light(
     scene: bpy.types.Scene, field: Field, lamps: Environment, samples: int, share: float = 0.0
-) -> Steps:
+) -> Steps[NDArray[np.float32]]:
     """Render the light of `lamps` on the picture of a field -> (H, W, 3), scene-linear.
 
     The light is 0 outside the field's region. share: how much of the whole work was done before,
@@ -90,7 +90,9 @@ def lamp_light(
 HELD_SAMPLES = 96
 
 
-def brightness(scene: bpy.types.Scene, field: Field, light: Environment, share: float) -> Steps:
+def brightness(
+    scene: bpy.types.Scene, field: Field, light: Environment, share: float
+) -> Steps[NDArray[np.float64]]:
     """Render a field's picture in the light of a map, small -> (3,), the mean radiance.
 
     share: how much of the whole work was done before, 0 to 1. The artist's scene is not changed.

@@ -184,7 +184,7 @@ def test_composite_without_a_render(ready) -> None:
     ready.arto.use_in_compositor = "RENDER"
     use(ready)
     scenes = len(bpy.data.scenes)
-    (path,) = work.run(save_composite(ready, LAYER))
+    path = work.run(save_composite(ready, LAYER))
     assert path.suffix == ".exr" and len(bpy.data.scenes) == scenes
     saved = next(iter(exr.read(path).values()))
     np.testing.assert_allclose(saved[..., :3], _plate(ready)[..., :3], rtol=1e-3, atol=1e-4)

@@ -293,7 +293,7 @@ def test_an_earlier_capture_stays_whole_until_the_new_one_is(tmp_path):
 def test_all_takes_must_find_room(tmp_path, monkeypatch):
     """Before the first of them is rendered: the estimate and the disk are of all three."""
     scene = with_catcher(tmp_path, samples=4, patches=1)
-    steps = lambda: capture.capture(scene, scene.view_layers[0].name, only_estimate=True)  # noqa: E731
+    steps = lambda: capture.estimate(scene, scene.view_layers[0].name)  # noqa: E731
     three = work.run(steps())
     scene.objects["Floor"].is_shadow_catcher = False
     one = work.run(steps())

@@ -9,7 +9,7 @@ import bpy
 import pytest
 from arto.arto_addon import work
 from arto.arto_addon.capture import room
-from arto.arto_addon.capture.capture import capture
+from arto.arto_addon.capture.capture import estimate
 from arto.arto_addon.capture.sequence import capture_frames
 from arto.arto_addon.farm import head as job_heads
 from arto.arto_addon.farm import part as parts
@@ -122,7 +122,7 @@ def test_the_parts_of_all_seeds_must_find_room(farm_scene, tmp_path, monkeypatch
     """Their images wait for each other; the room that one capture needs is not enough."""
     farm_scene.arto.adaptive = farm_scene.arto.far = False
     layer = farm_scene.view_layers[0].name
-    one = work.run(capture(farm_scene, layer, only_estimate=True))
+    one = work.run(estimate(farm_scene, layer))
     real = room.shutil.disk_usage
     free = int(1.5 * one.disk)
     monkeypatch.setattr(room.shutil, "disk_usage", lambda p: real(p)._replace(free=free))

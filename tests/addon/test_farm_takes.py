@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from arto.arto_addon import work
 from arto.arto_addon.capture import planned, room
-from arto.arto_addon.capture.capture import capture
+from arto.arto_addon.capture.capture import estimate
 from arto.arto_addon.farm import gather as gathering
 from arto.arto_addon.farm import part as parts
 from arto.arto_addon.farm import templates
@@ -251,7 +251,7 @@ def test_all_takes_must_find_room(tmp_path, monkeypatch):
     scene = saved_shot(tmp_path, samples=2)
     scene.arto.keep = "always"
     scene.objects["Floor"].is_shadow_catcher = False
-    one = work.run(capture(scene, scene.view_layers[0].name, only_estimate=True))
+    one = work.run(estimate(scene, scene.view_layers[0].name))
     real = room.shutil.disk_usage
     monkeypatch.setattr(
         room.shutil, "disk_usage", lambda p: real(p)._replace(free=int(1.5 * one.disk))

@@ -147,7 +147,7 @@ def test_the_estimate_is_of_what_comes(tmp_path, monkeypatch):
     scene.arto.samples = 4
     for keep in ("always", "never"):
         scene.arto.keep = keep
-        steps = capture.capture(scene, scene.view_layers[0].name, only_estimate=True)
+        steps = capture.estimate(scene, scene.view_layers[0].name)
         found = work.run(steps)
         assert not unfinished(scene)
         renders = []
@@ -159,7 +159,7 @@ def test_the_estimate_is_of_what_comes(tmp_path, monkeypatch):
         assert found.seconds is not None and found.seconds > 0
     # and time is of the paths
     scene.arto.samples = 4000
-    steps = capture.capture(scene, scene.view_layers[0].name, only_estimate=True)
+    steps = capture.estimate(scene, scene.view_layers[0].name)
     assert work.run(steps).seconds > 10 * found.seconds
 
 
@@ -202,7 +202,7 @@ def test_the_button_says_what_a_capture_may_take(tmp_path):
     said = planned.guess(scene)
     assert said.startswith("up to ") and "of disk while it runs" in said
     assert "memory" in planned.guess(scene, short=True)
-    steps = capture.capture(scene, scene.view_layers[0].name, only_estimate=True)
+    steps = capture.estimate(scene, scene.view_layers[0].name)
     estimate, most = work.run(steps), planned.most(scene)
     assert most.memory >= estimate.memory > 0 and most.disk >= estimate.disk > 0
     assert most.kept >= estimate.kept > 0
