@@ -4,6 +4,8 @@ Every value is asked for by its kind and its bounds. A value that is of another 
 bounds is a typed error that names it. A panel reads descriptions while it is drawn, so a damaged
 file must lead to no other exception.
 
+Where a description has a digest, the rest is compared with it (`signed`).
+
 Examples
 --------
 >>> import tempfile
@@ -23,7 +25,6 @@ arto.core.errors.FieldError: ... is damaged ('samples' cannot be 'many')
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -33,6 +34,7 @@ from .errors import ArtoError
 from .file_names import is_plain_name
 from .region import Region
 from .regular import read_regular
+from .signed import parsed
 
 # The largest file that is read. Fingerprints of 100,000 objects take 8 MB.
 MOST_BYTES = 64 << 20
@@ -65,12 +67,9 @@ class Description:
         self.path, self.error = path, error
         try:
             text = read_regular(path, most).decode("utf-8")
-            data = json.loads(text, parse_constant=_refuse)
+            self.data: dict[str, Any] = parsed(text)
         except (OSError, ValueError, RecursionError) as e:
             raise error(f"{path} cannot be read ({e})") from e
-        if not isinstance(data, dict):
-            raise error(f"{path} cannot be read (it is no description)")
-        self.data: dict[str, Any] = data
 
     def wrong(self, name: str, value: Any) -> ArtoError:
         """Make the error for a value that cannot be right.
@@ -372,7 +371,3 @@ def is_finite(value: Any) -> bool:
         return type(value) in (int, float) and math.isfinite(value)
     except OverflowError:
         return False
-
-
-def _refuse(constant: str) -> None:
-    raise ValueError(f"{constant} is no number")

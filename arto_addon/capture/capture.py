@@ -15,6 +15,7 @@ from ...core.capture import head as heads
 from ...core.capture.head import CaptureHead
 from ...core.capture.kinds import Keep, Route, Take
 from ...core.capture.names import GRAIN, GROUP, group_name
+from ...core.capture.tile_entry import sums_of
 from ...core.errors import ArtoError, CaptureSetError
 from ...core.files import Lock, whole
 from ...core.fit.choice import check as check_choice
@@ -203,7 +204,8 @@ def _render_tiles(on: Stage, folder: Path, head: CaptureHead) -> Steps[CaptureHe
             begun_at = time.perf_counter()
             files = yield from render_tile(on, head, t, folder)
             seconds = (head.seconds or 0.0) + time.perf_counter() - begun_at
-            head = replace(head.with_tile(t, files=tuple(files), done=True), seconds=seconds)
+            done = {"files": tuple(files), "sums": sums_of(folder, files), "done": True}
+            head = replace(head.with_tile(t, **done), seconds=seconds)
             heads.write(folder, head)
             take(0.0)
             yield from fit(t)

@@ -77,7 +77,7 @@ def finish(unfinished: Path, folder: Path) -> None:
 def let_go(folder: Path, head: CaptureHead, number: int, fitted: dict[str, Any]) -> CaptureHead:
     """Note down that a tile was fitted, then remove its basis images -> the new head."""
     files = head.tiles[number].files
-    head = head.with_tile(number, files=(), seeds=(), fitted=fitted)
+    head = head.with_tile(number, files=(), seeds=(), sums={}, fitted=fitted)
     heads.write(folder, head)
     for name in files:
         marked.remove_file(folder / name, "capture")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from ...core.capture import head as heads
 from ...core.capture.capture_set import CaptureSet
 from ...core.capture.head import CaptureHead
 from ...core.capture.kinds import Take
-from ...core.capture.tile_entry import SeedEntry, fitted_name
+from ...core.capture.tile_entry import SeedEntry, fitted_name, sums_of
 from ...core.errors import ArtoError, FarmError
 from ...core.field.field import proxy_folder
 from ...core.field.proxy import FACTORS
@@ -101,12 +101,14 @@ class Found:
     files : the names of its EXR files.
     samples : of each pixel.
     fitted : the entry in `field.json`, if the part was fitted and its images removed.
+    sums : the checksums of the files, by their names.
     """
 
     folder: Path | None
     files: tuple[str, ...] = ()
     samples: int = 0
     fitted: Mapping[str, Any] | None = None
+    sums: Mapping[str, int] = field(default_factory=dict)
 
 
 def _found(job: Job, part: Part, captured: CaptureSet) -> Found | None:
@@ -117,7 +119,7 @@ def _found(job: Job, part: Part, captured: CaptureSet) -> Found | None:
     if captured.head.tiles[part.tile].done:
         return Found(None)
     if told := job.there(part, captured.head.key):
-        return Found(job.part_folder(part), told.files, told.samples, told.fitted)
+        return Found(job.part_folder(part), told.files, told.samples, told.fitted, told.sums)
     files = []
     for i, images in enumerate(plan_of(captured.head)):
         rendered = sorted((job.folder / "parts").glob(f"{part.name}_{i:02d}_*.exr"))
@@ -128,7 +130,9 @@ def _found(job: Job, part: Part, captured: CaptureSet) -> Found | None:
         except ArtoError as e:
             raise FarmError(f"{e}: render part {part.number} again") from e
         files.append(rendered[-1].name)
-    return Found(job.folder / "parts", tuple(files), job.samples_of(captured.head))
+    parts = job.folder / "parts"
+    samples = job.samples_of(captured.head)
+    return Found(parts, tuple(files), samples, sums=sums_of(parts, files))
 
 
 def _joined(job: Job, frame: int, take: Take, parts: dict[Part, Found]) -> Steps[None]:
@@ -158,7 +162,7 @@ def _taken(
 
     The head is not written yet.
     """
-    seeds, fitted = [], None
+    seeds, fitted, sums = [], None, {}
     for part, told in some:
         names = []
         if told.folder is None:
@@ -167,6 +171,8 @@ def _taken(
             names.append(f"tile_{part.tile:04d}_seed_{part.seed:02d}_{i:04d}.exr")
             if (told.folder / name).exists():  # otherwise an earlier gathering moved it
                 (told.folder / name).replace(folder / names[-1])
+            if name in told.sums:
+                sums[names[-1]] = told.sums[name]
         seeds.append(SeedEntry(told.samples, tuple(names)))
         if told.fitted:
             fitted = told.fitted
@@ -177,6 +183,7 @@ def _taken(
         files=tuple(name for seed in seeds for name in seed.files),
         seeds=tuple(seeds) if len(seeds) > 1 else (),
         fitted=fitted or head.tiles[tile].fitted,
+        sums=sums,
         done=True,
     )
 

@@ -5,18 +5,17 @@ Only the functions here read and write these files.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from ...core import signed
 from ...core.capture.head import LARGEST_FRAME, LONGEST
 from ...core.capture.kinds import Take
-from ...core.capture.tile_entry import MOST_SAMPLES, fitted_name
+from ...core.capture.tile_entry import MOST_SAMPLES, checked_sums, fitted_name
 from ...core.errors import FarmError
 from ...core.field.writer import tile_names
-from ...core.files import write_text
 from ...core.values import Values
 from ..stage.takes import TAKES
 
@@ -182,6 +181,7 @@ class PartHead:
     files : the names of the part's EXR files, in its folder.
     seconds : how long the part took.
     fitted : the entry in `field.json`, if the part was fitted and its images removed.
+    sums : the checksums of the files, by their names.
     """
 
     part: Part
@@ -190,6 +190,7 @@ class PartHead:
     files: tuple[str, ...]
     seconds: float = 0.0
     fitted: Mapping[str, Any] | None = None
+    sums: Mapping[str, int] = field(default_factory=dict)
 
     @staticmethod
     def read(said: Values) -> PartHead:
@@ -207,6 +208,7 @@ class PartHead:
             files=tuple(said.file_name(name, "files") for name in files),
             seconds=said.real("seconds", 0, LONGEST) or 0.0,
             fitted=fitted,
+            sums=checked_sums(said),
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -218,6 +220,8 @@ class PartHead:
         }
         if self.fitted is not None:
             said["fitted"] = dict(self.fitted)
+        if self.sums:
+            said["sums"] = dict(self.sums)
         return said | {"files": list(self.files), "seconds": self.seconds}
 
 
@@ -245,7 +249,7 @@ def is_job(path: Path) -> bool:
 def write(folder: Path, head: JobHead) -> None:
     """Write `job.json` into a folder. Raises FarmError."""
     try:
-        write_text(folder / HEADER, json.dumps(head.to_json(), indent=1))
+        signed.write(folder / HEADER, head.to_json())
     except OSError as e:
         raise FarmError(f"{folder} cannot be written ({e}): choose another folder") from e
 
@@ -260,4 +264,4 @@ def read_part(folder: Path) -> PartHead | None:
 
 def write_part(folder: Path, head: PartHead) -> None:
     """Write `part.json` into a folder. Raises OSError."""
-    write_text(folder / PART_HEADER, json.dumps(head.to_json(), indent=1))
+    signed.write(folder / PART_HEADER, head.to_json())

@@ -16,6 +16,7 @@ import bpy
 from ...core import marked
 from ...core.capture.capture_set import CaptureSet
 from ...core.capture.head import CaptureHead
+from ...core.capture.tile_entry import sums_of
 from ...core.errors import FarmError
 from ...core.files import replace_folder
 from ...core.fit.fit import fit_into
@@ -66,6 +67,7 @@ def render_part(job_folder: Path, number: int) -> Steps[Path]:
             files=tuple(files),
             seconds=round(time.perf_counter() - begun, 3),
             fitted=entry,
+            sums=sums_of(partial, files),
         )
         write_part(partial, told)
         replace_folder(partial, folder)

@@ -6,15 +6,14 @@ each time, and the window reads it.
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
+from ...core import signed
 from ...core.description import Description
 from ...core.errors import ArtoError
-from ...core.files import write_text
 from ..blender.devices import Devices
 from .verbs import VERBS, Verb
 
@@ -57,7 +56,7 @@ class Task:
 
     def write(self, folder: Path) -> Path:
         path = folder / TASK
-        write_text(path, json.dumps(asdict(self)))
+        signed.write(path, asdict(self))
         return path
 
     @staticmethod
@@ -118,7 +117,7 @@ class State:
     result: str = ""
 
     def write(self, folder: Path) -> None:
-        write_text(folder / PROGRESS, json.dumps(asdict(self)))
+        signed.write(folder / PROGRESS, asdict(self))
 
     @staticmethod
     def read(folder: Path) -> State:

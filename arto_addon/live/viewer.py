@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.errors import ArtoError
+from ...core.errors import ArtoError, FieldError
 from ...core.light.environment import Environment
 from ...core.light.light import PatchLight
 from ...core.preview import Preview
@@ -137,6 +137,11 @@ def show(preview: Preview, wish: Wish) -> Drawn:
         there = view.any(axis=-1, keepdims=True)
         picture[:h, :w, :3] += (1 - picture[:h, :w, 3:]) * environment.at(view) * there
         picture[:h, :w, 3:] = np.where(there, 1, picture[:h, :w, 3:])
+    if not np.isfinite(picture).all():
+        raise FieldError(
+            "the picture is infinite or not a number in some pixels: look what is so bright in the "
+            "world, or capture again"
+        )
     return Drawn(wish, picture, factor, time.perf_counter() - wish.at)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core import cryptomatte, exr
-from ...core.errors import SceneError
+from ...core.errors import FieldError, SceneError
 from ...core.exr.window import NO_HIT, Window
 from ...core.field.field import Field
 from ..blender.colour import working_space
@@ -107,6 +107,8 @@ def data_file(path: Path) -> Path:
 
 # By the layers of the data file: the letters of the layer's channels.
 DATA = {"albedo": "RGB", "normal": "XYZ", "depth": "Z", "position": "XYZ"}
+# The part of the data file with what the artist's own render has.
+MATTES = "cryptomatte"
 # The attribute in the header of the data file that names the missing layers.
 MISSING = "arto.missing"
 
@@ -125,6 +127,11 @@ def write_data(
     for name, letters in DATA.items():
         if field.has_layer(name):
             pixels = field.layer(name).reshape(*field.shape, -1)
+            if not np.isfinite(pixels).all():
+                raise FieldError(
+                    f"'{name}' in {field.folder} is infinite or not a number in some pixels, so "
+                    "no data was written: capture again, or turn Write Data off"
+                )
             if name == "depth":  # 0 stands outside a render region, where no thing is seen.
                 pixels = np.where(pixels == 0, np.float32(NO_HIT), pixels)
             parts[name] = {c: pixels[..., i] for i, c in enumerate(letters)}
@@ -136,10 +143,10 @@ def write_data(
         planes, names = cryptomatte.read(rendered)
         if any(plane.shape != field.shape for plane in planes.values()):
             raise SceneError(f"{rendered} is a render of another size: render this shot again")
-        parts["cryptomatte"] = planes
+        parts[MATTES] = planes
         attributes |= names
     if parts:
-        exr.write_planes(data_file(path), parts, attributes, window_of(scene))
+        exr.write_planes(data_file(path), parts, attributes, window_of(scene), [MATTES])
     return missing
 
 

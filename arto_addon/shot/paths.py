@@ -10,7 +10,6 @@ alone. A copied file does not write into the folder of its original.
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import re
 import shutil
@@ -28,6 +27,7 @@ from ...core.field.head import HEADER as FIELD_HEADER
 from ...core.files import settle, write_text
 from ...core.regular import read_regular
 from ...core.shot import Shot
+from ...core.signed import text_of
 from ..stage.takes import TAKES
 from . import home
 from . import scene_id as scene_ids
@@ -242,7 +242,7 @@ def claim(scene: bpy.types.Scene, view_layer: str) -> Path:
     except ValueError:  # The .blend is on another drive.
         relative = blend
     about = {"shot": shot.to_json(), "blend": Path(relative).as_posix() if relative else ""}
-    text = json.dumps(about)
+    text = text_of(about)
     try:
         path = folder / HEADER
         if not _says(path, text):

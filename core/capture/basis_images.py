@@ -15,7 +15,7 @@ The mean of two seeds, of which the first has a quarter of the samples:
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -29,6 +29,7 @@ from ..region import Region
 from .names import GRAIN, OF_ONE_RAY
 from .seed import Expected, Seed
 from .tile_data import Around, TileData
+from .tile_entry import sums_of
 
 
 class BasisImages:
@@ -48,6 +49,8 @@ class BasisImages:
         Whether each patch has an image of the grain, see `names.GRAIN`.
     together : bool
         Whether all images of a patch are of one render. Otherwise no pattern shows grain.
+    sums : dict of str to int, optional
+        The checksums of the files, by their names. A file is compared with its own, if it has one.
 
     Raises
     ------
@@ -64,6 +67,7 @@ class BasisImages:
         patterns: PatternSet,
         grain: bool = False,
         together: bool = True,
+        sums: Mapping[str, int] | None = None,
     ) -> None:
         self.folder, self.region = folder, region
         self.hemicube, self.patterns, self.grain = hemicube, patterns, grain
@@ -73,6 +77,7 @@ class BasisImages:
         try:
             with self._files as files:
                 self._seeds = [Seed(expected, share, names, files) for share, names in renders]
+                _compare(folder, [name for _, names in renders for name in names], sums or {})
                 self._files = files.pop_all()
         except ExrError as e:
             raise CaptureSetError(f"{e} (run Capture again)") from e
@@ -238,6 +243,13 @@ class BasisImages:
         return TileData(
             self.region, basis, found.own, found.alpha, found.guides, grain, self.together
         )
+
+
+def _compare(folder: Path, names: list[str], sums: Mapping[str, int]) -> None:
+    """Raise CaptureSetError where a file does not have its checksum."""
+    for name, found in sums_of(folder, [n for n in names if n in sums]).items():
+        if found != sums[name]:
+            raise CaptureSetError(f"{folder / name} is not what was rendered: capture again")
 
 
 def _mean(first: tuple[float, NDArray], others: list[tuple[float, NDArray]]) -> NDArray:

@@ -24,7 +24,7 @@ from .head import CaptureHead
 from .kinds import Route
 from .names import COMBINED, group_name
 from .tile_data import TileData
-from .tile_entry import TileEntry
+from .tile_entry import TileEntry, sums_of
 
 
 class CaptureSet:
@@ -107,6 +107,7 @@ class CaptureSet:
             bool(self.head.grain),
             # the paths of two renders differ: the grain of one is not that of the other
             self.head.route in (None, Route.ALL),
+            entry.sums,
         )
 
     def read(self, tile: int) -> TileData:
@@ -143,6 +144,7 @@ def write(
             layers[f"Combined_{group_name(k, name)}"] = basis[k, p].astype(np.float32)
     exr.write(folder / "tile_0000.exr", layers)
     region = Region(0, 0, shape[1], shape[0])
-    tile = TileEntry(region, ("tile_0000.exr",), done=True)
+    name = "tile_0000.exr"
+    tile = TileEntry(region, (name,), done=True, sums=sums_of(folder, [name]))
     plain = CaptureHead(hemicube, patterns, shape[0], shape[1], (tile,))
     heads.write(folder, heads.from_json(plain.to_json() | about, folder))

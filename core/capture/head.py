@@ -20,7 +20,6 @@ arto.core.errors.CaptureSetError: ... is damaged ('route' cannot be 'none'): cap
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -28,10 +27,9 @@ from typing import Any
 
 import numpy as np
 
-from .. import marked
+from .. import marked, signed
 from ..description import MOST_TILES
 from ..errors import CaptureSetError, HemicubeError, PatternError, ShotError
-from ..files import write_text
 from ..hemicube import Hemicube
 from ..patterns import PatternSet, pattern_set
 from ..shot import Shot
@@ -374,7 +372,7 @@ def write(folder: Path, head: CaptureHead) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         marked.mark(folder, "capture")
-        write_text(path, json.dumps(head.to_json(), indent=1))
+        signed.write(path, head.to_json())
     except OSError as e:
         raise CaptureSetError(
             f"{path} cannot be written ({e}): make room on the disk, or choose a folder that can "

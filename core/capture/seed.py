@@ -2,9 +2,9 @@
 
 Examples
 --------
->>> _within(np.array([0.0, 1.0], np.float32).view(np.int32))
+>>> _within(np.array([0.0, 1.0], np.float32).view(np.int32), BRIGHTEST)
 True
->>> [_within(np.array([x], np.float32).view(np.int32)) for x in (-1.0, np.inf, np.nan)]
+>>> [_within(np.array([x], np.float32).view(np.int32), np.inf) for x in (-1.0, np.inf, np.nan)]
 [False, False, False]
 """
 
@@ -27,6 +27,10 @@ from .tile_data import Around
 # What remains of Combined without the light groups, as a share of them, where there is no other
 # light. It is the rounding of float32 sums over a few hundred passes.
 ROUNDING = 3e-5
+# No pixel gets more from a patch whose radiance is 1: things that add no light of their own give
+# back at most what falls on them, and even a firefly of a few samples has far less. The others of
+# its tile would lose their precision beside such a pixel (see `field.tile.LARGEST`).
+BRIGHTEST = 1e6
 
 
 @dataclass(frozen=True)
@@ -251,25 +255,25 @@ class Seed:
                 f"{say} is of {pixels.dtype}: half floats put a floor under small supports; "
                 "save it as 32-bit float, or capture again"
             )
+        # the scene's own lamps, which only Combined has, may be as bright as they like
+        most = BRIGHTEST if shape[-1] == 3 else np.inf
         # a comparison of the bits finds negative numbers, infinities and NaN in one pass
         bits = pixels.view(np.int32) if pixels.flags.c_contiguous else None
-        if bits is None or not _within(bits.reshape(-1)):
-            bad = ~(np.isfinite(pixels) & (pixels >= 0)).all(axis=-1)
+        if bits is None or not _within(bits.reshape(-1), most):
+            bad = ~((pixels < most) & (pixels >= 0)).all(axis=-1)
             if not bad.any():
                 return
             y, x = np.argwhere(bad)[0]
             raise CaptureSetError(
-                f"{say} has {int(bad.sum())} pixels that are negative, infinite or not a number, "
-                f"the first at ({x}, {y}): find the material there, and capture again"
+                f"{say} has {int(bad.sum())} pixels that are negative, infinite, not a number or "
+                f"too bright to be light of a patch, the first at ({x}, {y}): find the material "
+                "there, and capture again"
             )
 
 
-_INFINITY = int(np.float32(np.inf).view(np.int32))
-
-
-def _within(bits: NDArray[np.int32]) -> bool:
-    """Whether the floats with these bits are finite and at least 0.
+def _within(bits: NDArray[np.int32], most: float) -> bool:
+    """Whether the floats with these bits are at least 0 and below the most.
 
     Compared as unsigned numbers, negative floats, infinity and NaN come after all others.
     """
-    return bool(bits.view(np.uint32).max(initial=0) < _INFINITY)
+    return bool(bits.view(np.uint32).max(initial=0) < int(np.float32(most).view(np.uint32)))

@@ -12,16 +12,19 @@ Examples
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
+from .. import checksum
+from ..errors import CaptureSetError
 from ..region import Region
 from ..values import Values
 
 # No renderer counts more samples of a pixel.
 MOST_SAMPLES = 2**31 - 1
-_NAMES = ("region", "files", "done", "seeds", "fitted")
+_NAMES = ("region", "files", "done", "seeds", "fitted", "sums")
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,7 @@ class TileEntry:
     done : whether it was rendered.
     seeds : where several stretches of samples were rendered, each of them.
     fitted : where it was fitted and its images went, its entry in `field.json`.
+    sums : the checksums of its files, by their names. The version before has none.
     others : what the file says of it beside that.
     """
 
@@ -57,6 +61,7 @@ class TileEntry:
     done: bool = False
     seeds: tuple[SeedEntry, ...] = ()
     fitted: Mapping[str, Any] | None = None
+    sums: Mapping[str, int] = field(default_factory=dict)
     others: Mapping[str, Any] = field(default_factory=dict)
 
     @staticmethod
@@ -89,7 +94,8 @@ class TileEntry:
         fitted = said.kind("fitted", dict)
         if fitted is not None:
             said.file_name(fitted_name(fitted), "fitted")
-        return TileEntry(region, names, done, seeds, fitted, said.others(_NAMES))
+        sums = checked_sums(said)
+        return TileEntry(region, names, done, seeds, fitted, sums, said.others(_NAMES))
 
     def to_json(self) -> dict[str, Any]:
         """Give what `read` reads.
@@ -108,6 +114,8 @@ class TileEntry:
             out["seeds"] = [[seed.samples, list(seed.files)] for seed in self.seeds]
         if self.fitted is not None:
             out["fitted"] = dict(self.fitted)
+        if self.sums:
+            out["sums"] = dict(self.sums)
         return out | dict(self.others)
 
     @property
@@ -117,6 +125,54 @@ class TileEntry:
             return [(1.0, list(self.files))]
         total = sum(seed.samples for seed in self.seeds)
         return [(seed.samples / total, list(seed.files)) for seed in self.seeds]
+
+
+def sums_of(folder: Path, names: Iterable[str]) -> dict[str, int]:
+    """Compute the checksums of files.
+
+    Parameters
+    ----------
+    folder : Path
+    names : iterable of str
+
+    Returns
+    -------
+    dict of str to int
+        By the names.
+
+    Raises
+    ------
+    CaptureSetError
+        A file cannot be read.
+    """
+    try:
+        return {name: checksum.of_file(folder / name) for name in names}
+    except OSError as e:
+        raise CaptureSetError(f"{folder} lacks what was rendered ({e}): capture again") from e
+
+
+def checked_sums(said: Values) -> dict[str, int]:
+    """Read the checksums of files.
+
+    Parameters
+    ----------
+    said : Values
+        The description that may have them.
+
+    Returns
+    -------
+    dict of str to int
+        By the names of the files.
+
+    Raises
+    ------
+    ArtoError
+        One cannot be right.
+    """
+    found = said.kind("sums", dict, {})
+    for name in found:
+        said.whole(name, 0, 2**32 - 1, found)
+    return found
 
 
 def fitted_name(fitted: Mapping[str, Any]) -> Any:

@@ -1,5 +1,8 @@
 """Writing EXR files, whole or not at all.
 
+No file with an infinite pixel, or with one that is not a number, is written unless the caller says
+so: one such pixel spoils whatever a compositor filters or adds up.
+
 Examples
 --------
 >>> import tempfile
@@ -14,6 +17,7 @@ Examples
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +45,7 @@ def write(
     attributes: dict[str, Any] | None = None,
     colour_space: str = "Linear Rec.709",
     window: Window = FULL,
+    finite: bool = True,
 ) -> None:
     """Write layers, each as a part of its own, with ZIP compression.
 
@@ -56,13 +61,18 @@ def write(
     colour_space : str
         Blender's name of the space of the pixels.
     window : Window
+    finite : bool
+        Whether pixels that are infinite or not a number are refused.
 
     Raises
     ------
     ExrError
-        The folder cannot be written, the disk is full, or the window does not fit the picture.
+        The folder cannot be written, the disk is full, the window does not fit the picture, or a
+        pixel is infinite or not a number: the message names the layer and the pixel.
     """
     parts = [(name, _channels(pixels)) for name, pixels in layers.items()]
+    if finite:
+        _check_finite(path, parts)
     _write(path, parts, attributes, colour_space, window)
 
 
@@ -71,6 +81,7 @@ def write_planes(
     parts: dict[str, dict[str, NDArray]],
     attributes: dict[str, Any],
     window: Window = FULL,
+    handed_on: Collection[str] = (),
 ) -> None:
     """Write data that is no colour, as planes of 32-bit floats in parts.
 
@@ -82,6 +93,8 @@ def write_planes(
     attributes : dict
         For the header.
     window : Window
+    handed_on : collection of str
+        The parts that are another program's, whatever is in them.
 
     Raises
     ------
@@ -92,6 +105,7 @@ def write_planes(
         part: {name: np.ascontiguousarray(p, np.float32) for name, p in channels.items()}
         for part, channels in parts.items()
     }
+    _check_finite(path, [part for part in planes.items() if part[0] not in handed_on])
     _write(path, list(planes.items()), attributes, "Non-Color", window)
 
 
@@ -127,7 +141,23 @@ def write_layered(
     channels = _channels(beauty)
     for name, pixels in layers.items():
         channels |= {f"{name}.{c}": plane for c, plane in _channels(pixels).items()}
+    _check_finite(path, [("", channels)])
     _write(path, [("", channels)], attributes, colour_space, window)
+
+
+def _check_finite(path: Path, parts: Iterable[tuple[str, dict[str, NDArray]]]) -> None:
+    """Raise ExrError where a pixel is infinite or not a number."""
+    for part, channels in parts:
+        for name, plane in channels.items():
+            good = np.isfinite(plane)
+            if good.all():
+                continue
+            y, x = np.argwhere(~good)[0]
+            raise ExrError(
+                f"{path} was not written: '{f'{part}.{name}'.lstrip('.')}' is infinite or not a "
+                f"number in {int((~good).sum())} pixels, the first at row {y}, column {x}. Find "
+                "what is so bright there, or what is no number in the file that it comes from"
+            )
 
 
 def _channels(pixels: NDArray) -> dict[str, NDArray]:

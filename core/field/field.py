@@ -20,10 +20,8 @@ from ..region import Region
 from . import head as heads
 from .about import About
 from .head import HEADER
-from .tile import OTHERS, Tile
+from .tile import OF_A_MODEL, OTHERS, Tile
 
-# The arrays of a support model.
-OF_A_MODEL = ("coefficient", "parameters", "pixels", "counts")
 LAYERS = ("own", "alpha", "albedo", "normal", "depth", "position")
 
 
@@ -68,7 +66,8 @@ class Field:
         self.head = heads.read(folder)
         patches = len(self.head.hemicube)
         self.tiles = [
-            Tile(folder / t.name, t.region, dict(t.entries), patches) for t in self.head.tiles
+            Tile(folder / t.name, t.region, dict(t.entries), patches, t.checksum)
+            for t in self.head.tiles
         ]
 
     def __enter__(self) -> Field:

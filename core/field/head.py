@@ -43,12 +43,15 @@ class FieldTile:
         By the name of each support model in use, how many entries it has.
     proxies : mapping of int to FieldTile
         By their factors, its entries in the heads of the field's proxies.
+    checksum : int or None
+        Of its arrays, see `tile.checksum_of`. Fields of the version before do not say it.
     """
 
     name: str
     region: Region
     entries: Mapping[str, int]
     proxies: Mapping[int, FieldTile] = field(default_factory=dict)
+    checksum: int | None = None
 
     @staticmethod
     def read(region: Region, said: Values, shape: tuple[int, int], patches: int) -> FieldTile:
@@ -92,7 +95,7 @@ class FieldTile:
             ((small, _),) = Values.of(of, said.path, said.error, "proxies.").tiles()
             within = said.inside(entry, "proxies", "proxies.")
             proxies[int(factor)] = FieldTile.read(small, within, (size[0], size[1]), patches)
-        return FieldTile(name, region, used, proxies)
+        return FieldTile(name, region, used, proxies, said.count("checksum", 0, 2**32 - 1))
 
     def to_json(self) -> dict[str, Any]:
         """What `read` reads.
@@ -108,6 +111,8 @@ class FieldTile:
             "region": [r.x, r.y, r.width, r.height],
             "entries": dict(self.entries),
         }
+        if self.checksum is not None:
+            out["checksum"] = self.checksum
         if self.proxies:
             out["proxies"] = {str(f): proxy.to_json() for f, proxy in self.proxies.items()}
         return out

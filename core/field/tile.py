@@ -10,6 +10,8 @@ of it at 128 samples a pixel. A bit for each pixel, patch and model in use says 
 
 from __future__ import annotations
 
+import zlib
+from collections.abc import Iterable
 from functools import cached_property
 from pathlib import Path
 
@@ -20,7 +22,7 @@ from ..errors import FieldError
 from ..region import Region
 from ..supports import BY_CODE, NOTHING, REST
 from .model import Entries, Model
-from .tile_file import TileFile
+from .tile_file import Stored, TileFile
 from .tile_folder import TileFolder
 
 # The arrays of a tile stand block after block: so many pixels at a time, row by row. A block is
@@ -35,6 +37,34 @@ LARGEST = 6e4
 SUFFIX = ".arto"
 # Beside the models' arrays, what relighting reads.
 OTHERS = ("peaks", "scales", "rest", "rest_weights", "rest_patches")
+
+
+# The ends of the names of a model's arrays.
+OF_A_MODEL = ("counts", "pixels", "coefficient", "parameters")
+
+
+def checksum_of(arrays: Iterable[Stored]) -> int:
+    """Compute the checksum of a tile: of all but its layers, which may be replaced.
+
+    It tells a tile from that of another field.
+
+    Parameters
+    ----------
+    arrays : iterable of Stored
+        The index of the tile's file.
+
+    Returns
+    -------
+    int
+    """
+    ends = tuple(f"_{end}" for end in OF_A_MODEL)
+    of = [
+        s
+        for s in arrays
+        if s.name in OTHERS or (s.name.endswith(ends) and not s.name.startswith("own_"))
+    ]
+    said = sorted((s.name, s.type, s.shape, s.crc32) for s in of)
+    return zlib.crc32(repr(said).encode())
 
 
 def blocks_of(pixels: int) -> list[slice]:
@@ -66,15 +96,30 @@ class Tile:
         By the name of each support model in use, how many entries it has.
     patches : int
         Those of the hemicube, K.
+    checksum : int, optional
+        That the tile must have, see `checksum_of`.
     """
 
-    def __init__(self, path: Path, region: Region, used: dict[str, int], patches: int) -> None:
+    def __init__(
+        self,
+        path: Path,
+        region: Region,
+        used: dict[str, int],
+        patches: int,
+        checksum: int | None = None,
+    ) -> None:
         self.path, self.region, self.used, self.patches = path, region, used, patches
+        self.checksum = checksum
         self.blocks = blocks_of(region.pixels)
 
     @cached_property
     def _arrays(self) -> TileFile | TileFolder:
-        return TileFile(self.path) if self.path.suffix == SUFFIX else TileFolder(self.path)
+        if self.path.suffix != SUFFIX:
+            return TileFolder(self.path)
+        found = TileFile(self.path)
+        if self.checksum not in (None, checksum_of(found.index.values())):
+            raise FieldError(f"{self.path} is of another field than the head beside it: fit again")
+        return found
 
     def close(self) -> None:
         """Let go of all that is mapped. What is asked for afterwards is mapped anew.

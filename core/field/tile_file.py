@@ -20,7 +20,6 @@ import contextlib
 import json
 import mmap
 import re
-import stat
 import struct
 import sys
 import zlib
@@ -32,8 +31,10 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import checksum
 from ..errors import FieldError
 from ..files import whole
+from ..regular import open_regular
 
 MAGIC = b"ARTOTILE"
 VERSION = 1
@@ -87,7 +88,8 @@ class Stored:
 class TileFile:
     """The file of a tile, mapped: arrays are read from the disk as they are used.
 
-    The map is let go with the last array of it.
+    An array is compared with its checksum the first time that it is asked for. The map is let go
+    with the last array of it.
 
     Parameters
     ----------
@@ -105,6 +107,7 @@ class TileFile:
         with _opened(path) as file:
             self.index = _index(file, path)
             self._map = _mapped(file)
+        self._compared: set[str] = set()
 
     @property
     def sizes(self) -> dict[str, int]:
@@ -126,11 +129,18 @@ class TileFile:
         Raises
         ------
         FieldError
-            If there is none of that name.
+            If there is none of that name, or its bytes are not those that were written.
         """
         stored = self.index.get(name)
         if stored is None:
             raise FieldError(f"{self.path} lacks '{name}': fit again")
+        if name not in self._compared:
+            end = stored.offset + stored.bytes
+            with memoryview(self._map) as mapped, mapped[stored.offset : end] as data:
+                found = checksum.crc32(data)
+            if found != stored.crc32:
+                raise _damaged(self.path, f"'{name}' is not what was written")
+            self._compared.add(name)
         return np.ndarray(stored.shape, stored.dtype, self._map, stored.offset)
 
 
@@ -147,6 +157,11 @@ class TileFileWriter:
         self._file = file
         self._stored: list[Stored] = []
         file.write(bytes(ALIGNED))
+
+    @property
+    def stored(self) -> tuple[Stored, ...]:
+        """The arrays that were added so far."""
+        return tuple(self._stored)
 
     def add(self, name: str, array: NDArray) -> None:
         """Write an array.
@@ -169,7 +184,7 @@ class TileFileWriter:
         data = array.reshape(-1).view(np.uint8).data
         offset = self._aligned()
         self._file.write(data)
-        size = (array.nbytes, zlib.crc32(data))
+        size = (array.nbytes, checksum.crc32(data))
         self._stored.append(Stored(name, kind, array.shape, offset, *size))
 
     def copy(self, stored: Stored, source: BinaryIO, path: Path) -> None:
@@ -282,9 +297,7 @@ def _opened(path: Path) -> Iterator[BinaryIO]:
     """The file, to be read. Raises FieldError where there is none."""
     try:
         # a pipe or a device in its place would be waited for
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise _damaged(path, "it is no file")
-        file = path.open("rb")
+        file = open_regular(path, follow=True)
     except OSError as e:
         raise _damaged(path, e) from e
     with file:

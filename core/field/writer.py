@@ -11,22 +11,21 @@ False (1080, 1920)
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import replace
 from pathlib import Path
 
 from numpy.typing import NDArray
 
-from .. import marked
+from .. import marked, signed
 from ..errors import FieldError
-from ..files import PART, replace_folder, write_text
+from ..files import PART, replace_folder
 from ..hemicube import Hemicube
 from .about import About
 from .field import Field, proxy_folder
 from .head import HEADER, FieldHead, FieldTile
 from .proxy import FACTORS, proxies
-from .tile import SUFFIX
+from .tile import SUFFIX, checksum_of
 from .tile_file import rewrite, written
 from .tile_folder import rewrite_folder
 from .tile_writer import TileWriter, stored_layer
@@ -82,7 +81,8 @@ def write_tile(
         folder.mkdir(parents=True, exist_ok=True)
         marked.mark(folder, "field")
         with written(folder / name) as out:
-            return FieldTile(name, tile.region, tile.write(out))
+            entries = tile.write(out)
+            return FieldTile(name, tile.region, entries, checksum=checksum_of(out.stored))
 
     with _writing(of or folder):
         # the tile itself last: where it is, its proxies are
@@ -121,12 +121,8 @@ def write_head(folder: Path, head: FieldHead) -> None:
                     about=replace(head.about, proxy=factor),
                     tiles=tuple(tiles),
                 )
-                write_text(proxy_folder(folder, factor) / HEADER, _text(own))
-        write_text(folder / HEADER, _text(head))
-
-
-def _text(head: FieldHead) -> str:
-    return json.dumps(head.to_json(), indent=1)
+                signed.write(proxy_folder(folder, factor) / HEADER, own.to_json())
+        signed.write(folder / HEADER, head.to_json())
 
 
 def replace_layers(field: Field, layers: dict[str, NDArray]) -> None:

@@ -29,6 +29,7 @@ from arto.core.light.environment import Environment
 from arto.core.light.light import PatchLight
 from arto.core.metrics import mean_relative_error
 from arto.core.relight import relight
+from arto.core.signed import parsed
 from scene_tools import captured
 from shot_tools import arrays, assert_same, planned_job
 
@@ -162,7 +163,7 @@ def test_another_scene_is_refused(farm_scene, tmp_path):
     assert_same(arrays(job.folder), before)
     farm_scene.objects["Glossy"].location.x -= 0.1
     work.run(parts.render_part(job.folder, 1))
-    told = json.loads((job.folder / "parts/part_0001/part.json").read_text())
+    told = parsed((job.folder / "parts/part_0001/part.json").read_text())
     told["key"] = "another"
     (job.folder / "parts/part_0001/part.json").write_text(json.dumps(told))
     with pytest.raises(FarmError, match="another scene, or for another plan"):
@@ -190,7 +191,7 @@ DAMAGE = [
 
 def test_a_damaged_job_is_refused(farm_scene, tmp_path):
     job = planned_job(farm_scene, tmp_path / "job")
-    data = json.loads((job.folder / job_heads.HEADER).read_text())
+    data = parsed((job.folder / job_heads.HEADER).read_text())
     for key, value in DAMAGE:
         (job.folder / job_heads.HEADER).write_text(json.dumps(data | {key: value}))
         with pytest.raises(ArtoError, match=rf"'{key}' cannot be .*plan again"):

@@ -20,6 +20,7 @@ from arto.arto_addon.shot import paths
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import FarmError, SceneError
 from arto.core.field.field import Field
+from arto.core.signed import parsed
 from scene_tools import captured
 from shot_tools import arrays, assert_same, planned_job
 
@@ -60,7 +61,7 @@ def test_the_quality_is_that_of_the_scene(farm_scene, tmp_path, seeds):
     job = planned_job(farm_scene, tmp_path / "job", seeds=seeds)
     for p in job.parts:
         folder = work.run(parts.render_part(job.folder, p.number))
-        told = json.loads((folder / job_heads.PART_HEADER).read_text())
+        told = parsed((folder / job_heads.PART_HEADER).read_text())
         assert told["samples"] == 6
         if seeds == 2 and p.seed == 1:
             # as a Blender without ARTO leaves it
@@ -107,9 +108,9 @@ def test_a_job_of_the_version_before_goes_on(farm_scene, tmp_path):
     farm_scene.arto.adaptive = farm_scene.arto.far = False
     job = planned_job(farm_scene, tmp_path / "job")
     work.run(parts.render_part(job.folder, 0))
-    part = json.loads((job.part_folder(job.parts[0]) / job_heads.PART_HEADER).read_text())
+    part = parsed((job.part_folder(job.parts[0]) / job_heads.PART_HEADER).read_text())
     assert part["part"] == {"number": 0, "frame": 1, "tile": 0, "seed": 0}, "as before"
-    data = json.loads((job.folder / job_heads.HEADER).read_text())
+    data = parsed((job.folder / job_heads.HEADER).read_text())
     del data["catchers"], data["subframe"]
     data["settings"] |= {"overscan": 7, "scene_id": ""}
     (job.folder / job_heads.HEADER).write_text(json.dumps(data | {"version": 1}))

@@ -16,6 +16,7 @@ from arto.arto_addon.shot import home
 from arto.arto_addon.shot.fingerprint import changes, fingerprint
 from arto.arto_addon.work import driven, retold
 from arto.core.errors import ArtoError, CancelledError, SceneError
+from arto.core.signed import parsed
 from arto.core.units import clock
 from scene_tools import add_mesh, small_scene
 
@@ -150,7 +151,7 @@ def test_what_a_task_cannot_be_is_said(tmp_path, where, name, value):
     painted = (Painted("Wood", "", "painted_1.npy"),)
     task = Task("fit", "Scene", "Layer", "", Devices("NONE", {"CPU": True}), painted)
     path = task.write(tmp_path)
-    data = json.loads(path.read_text())
+    data = parsed(path.read_text())
     part = data
     for step in where:
         part = part[step]
@@ -175,7 +176,7 @@ def test_a_file_that_is_no_task_is_said(tmp_path, text):
 def test_what_a_state_cannot_be_is_said(tmp_path, name, value):
     State(0.5, "text", 3.0, 4.0, "done", "/a/plate.exr").write(tmp_path)
     path = tmp_path / "progress.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | {name: value}))
+    path.write_text(json.dumps(parsed(path.read_text()) | {name: value}))
     with pytest.raises(ArtoError, match=f"'{name}'.*start it again"):
         State.read(tmp_path)
 

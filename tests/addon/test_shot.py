@@ -21,6 +21,7 @@ from arto.arto_addon.relight import many
 from arto.arto_addon.shot import paths, scene_id, status
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import BusyError, CaptureSetError, ShotError
+from arto.core.signed import parsed
 from scene_tools import captured, small_scene
 
 
@@ -222,7 +223,7 @@ def test_what_the_version_before_left_is_read(tmp_path):
     old.parent.mkdir()
     shutil.move(there.folder, old)
     shutil.rmtree(tmp_path / "arto" / "shot")
-    head = json.loads((old / "capture.json").read_text())
+    head = parsed((old / "capture.json").read_text())
     shot = head["shot"]
     head["shot"] = {n: shot[n] for n in ("scene", "frame", "width", "height", "lens")}
     head["shot"]["camera"] = shot["camera_matrix"]

@@ -11,6 +11,7 @@ import bpy
 from arto.arto_addon import work
 from arto.arto_addon.fit import fit
 from arto.arto_addon.shot import paths, status, watch
+from arto.core.signed import parsed
 from scene_tools import captured, small_scene
 
 
@@ -39,7 +40,8 @@ def test_lines_follow_the_files(tmp_path):
     stopped = folder.with_name("unfinished-12345678")
     folder.rename(stopped)
     head = stopped / "capture.json"
-    head.write_text(head.read_text().replace('"done": true', '"done": false'))
+    text = head.read_text().replace('"done": true', '"done": false')
+    head.write_text(json.dumps(parsed(text.rpartition(",")[0] + "}")))
     assert status.capture_line(scene) == ("unfinished, 0 of 1 tiles", False)
     # damaged: the rest of the panel must be drawn
     stopped.rename(folder)
@@ -70,7 +72,7 @@ def test_a_description_without_its_shot_is_taken_as_it_is(tmp_path):
     """Of a capture set that another program wrote, nobody can say of which shot it is."""
     scene = small_scene(tmp_path)
     path = captured(scene).folder / "capture.json"
-    path.write_text(json.dumps({**json.loads(path.read_text()), "shot": None}))
+    path.write_text(json.dumps({**parsed(path.read_text()), "shot": None}))
     assert status.capture_line(scene) == ("6 patches, 64 samples", True)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from arto.core.capture.head import CaptureHead
 from arto.core.capture.tile_entry import TileEntry
 from arto.core.errors import FieldError
 from arto.core.field.field import Field
+from arto.core.field.head import HEADER
 from arto.core.field.tile_file import TileFile, written
 from arto.core.fit import fit
 from arto.core.hemicube import Hemicube
@@ -26,6 +28,7 @@ from arto.core.light.light import PatchLight
 from arto.core.patterns import PatternSet, monomials, pattern_set
 from arto.core.region import Region
 from arto.core.relight import relight
+from arto.core.signed import parsed
 from hypothesis import settings
 from numpy.typing import NDArray
 
@@ -214,6 +217,12 @@ def _put_arrays(tile: Path, **arrays: NDArray | None) -> None:
         for name, array in kept.items():
             if array is not None:
                 out.add(name, array)
+    header = tile.parent / HEADER
+    if header.exists():  # as the version before wrote it, which had no checksums of tiles
+        head = parsed(header.read_text())
+        for entry in head["tiles"]:
+            entry.pop("checksum", None)
+        header.write_text(json.dumps(head))
 
 
 def _used(folder: Path) -> NDArray[np.float32]:

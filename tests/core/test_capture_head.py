@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from arto.core import signed
 from arto.core.capture import head as heads
 from arto.core.capture.agreement import Caution
 from arto.core.capture.capture_set import CaptureSet
@@ -17,6 +18,7 @@ from arto.core.capture.kinds import Keep, Quality, Route, Take
 from arto.core.capture.tile_entry import SeedEntry, TileEntry
 from arto.core.errors import CaptureSetError
 from arto.core.region import Region
+from arto.core.signed import parsed
 
 ENTRY = {"folder": "tile_0000", "region": [0, 0, 24, 6], "entries": {"linear": 112, "box": 6}}
 ENTRY |= {"proxies": {"2": {"folder": "tile_0000", "region": [0, 0, 12, 3], "entries": {"box": 4}}}}
@@ -138,7 +140,7 @@ FILES = {
 def test_a_file_comes_back_letter_by_letter(tmp_path: Path, data: dict[str, Any]) -> None:
     head = opened(tmp_path, data)
     heads.write(tmp_path, head)
-    assert (tmp_path / HEADER).read_text(encoding="utf-8") == text_of(data)
+    assert (tmp_path / HEADER).read_text(encoding="utf-8") == signed.text_of(data)
     assert heads.read(tmp_path) == head
 
 
@@ -168,7 +170,7 @@ def test_what_another_version_says_beside_that_stays(tmp_path: Path) -> None:
     head = opened(tmp_path, data)
     assert head.others == {"weather": {"wind": [1, 2]}}
     heads.write(tmp_path, replace(head.with_tile(2, done=True), seconds=2.0))
-    again = json.loads((tmp_path / HEADER).read_text())
+    again = parsed((tmp_path / HEADER).read_text())
     data["tiles"][2]["done"] = True
     assert again == data | {"seconds": 2.0}
 

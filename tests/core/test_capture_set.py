@@ -20,6 +20,7 @@ from arto.core.hemicube import Hemicube
 from arto.core.marked import MARK
 from arto.core.patterns import PATTERN_SETS, pattern_set
 from arto.core.region import Region
+from arto.core.signed import parsed
 
 CUBE = Hemicube(faces=("top", "back"), patches=2, half_sides=True, centre=(1.0, 2.0, 3.0))
 FILE = "tile_0000.exr"
@@ -35,11 +36,20 @@ def folder(tmp_path: Path, scene, write_scene) -> Path:
 def change(folder: Path, **layers: np.ndarray | None) -> None:
     """Replace parts of the tile's file; None takes one away."""
     held = exr.read(folder / FILE) | layers
-    exr.write(folder / FILE, {name: px for name, px in held.items() if px is not None})
+    exr.write(
+        folder / FILE, {name: px for name, px in held.items() if px is not None}, finite=False
+    )
+    without_sums(folder)
+
+
+def without_sums(folder: Path) -> None:
+    """As the version before wrote it, which had no checksums."""
+    tiles = parsed((folder / HEADER).read_text())["tiles"]
+    change_header(folder, tiles=[{n: v for n, v in t.items() if n != "sums"} for t in tiles])
 
 
 def change_header(folder: Path, **values: object) -> None:
-    head = json.loads((folder / HEADER).read_text())
+    head = parsed((folder / HEADER).read_text())
     (folder / HEADER).write_text(json.dumps(head | values))
 
 
@@ -115,7 +125,7 @@ def test_places_of_two_seeds_are_not_mixed(tmp_path: Path, scene, write_scene) -
     for seed in (0, 1):
         guides = {"Denoising Albedo": albedo[seed], "Depth": depth[seed]}
         exr.write(folder / f"{seed}.exr", held | guides | {"Position": position[seed]})
-    (tile,) = json.loads((folder / HEADER).read_text())["tiles"]
+    (tile,) = parsed((folder / HEADER).read_text())["tiles"]
     tile["files"] = ["0.exr", "1.exr"]
     tile["seeds"] = [[3, ["0.exr"]], [1, ["1.exr"]]]
     change_header(folder, tiles=[tile])
@@ -129,6 +139,7 @@ def test_names_with_a_view_layer_are_understood(folder: Path, scene) -> None:
     """As Blender writes them."""
     held = exr.read(folder / FILE)
     exr.write(folder / FILE, {f"View Layer.{name}": px for name, px in held.items()})
+    without_sums(folder)
     np.testing.assert_array_equal(CaptureSet(folder).read(0).basis, scene(CUBE).basis)
 
 
@@ -141,9 +152,19 @@ def test_layers_interleaved_in_one_part_are_the_same(folder: Path) -> None:
             planes[f"ViewLayer.{name}.{c}"] = np.ascontiguousarray(pixels[..., n])
     head = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     OpenEXR.File(head, planes).write(str(folder / FILE))
+    without_sums(folder)
     after = CaptureSet(folder).read(0)
     for name in ("basis", "own", "alpha"):
         np.testing.assert_array_equal(getattr(after, name), getattr(before, name))
+
+
+def test_an_image_that_was_changed_is_found(folder: Path) -> None:
+    """Also where it is a whole file with light in it: of another render, for example."""
+    held = exr.read(folder / FILE)
+    name = next(name for name in held if name.startswith("Combined_ARTO"))
+    held[name][0, 0] = 1e12
+    exr.write(folder / FILE, held)
+    refused(folder, f"{FILE} is not what was rendered: capture again")
 
 
 def test_a_tile_may_lie_in_several_files(tmp_path: Path, scene, write_scene) -> None:
@@ -217,7 +238,7 @@ def test_another_version(folder: Path) -> None:
 
 
 def test_unfinished(folder: Path) -> None:
-    head = json.loads((folder / HEADER).read_text())
+    head = parsed((folder / HEADER).read_text())
     tiles = [*head["tiles"], {"region": [0, 0, 8, 6], "files": [], "done": False}]
     change_header(folder, tiles=tiles)
     refused(folder, "unfinished (1 of 2 tiles)", "it goes on from there")
@@ -286,6 +307,19 @@ def test_pixels_that_are_no_light(folder: Path, part: str, bad: float) -> None:
     pixels[5, 0] = bad
     change(folder, **{part: pixels})
     refused(folder, FILE, part, "2 pixels that are negative", "the first at (5, 4)", "material")
+
+
+def test_a_pixel_that_outshines_all_light_is_refused(folder: Path) -> None:
+    """One of 1e12 took their precision from all others; the scene's own lamps may be so bright."""
+    pixels = exr.read(folder / FILE)[PART].copy()
+    pixels[2, 3] = 1e12
+    change(folder, **{PART: pixels})
+    refused(folder, FILE, PART, "too bright to be light of a patch", "the first at (3, 2)")
+    pixels[2, 3] = 1
+    combined = exr.read(folder / FILE)["Combined"].copy()
+    combined[2, 3] = 1e12
+    change(folder, **{PART: pixels, "Combined": combined})
+    assert CaptureSet(folder).read(0).own[2, 3, 0] > 9e11
 
 
 def test_a_negative_zero_is_no_error(folder: Path) -> None:

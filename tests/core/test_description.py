@@ -20,6 +20,7 @@ from arto.core.fit import fit
 from arto.core.hemicube import Hemicube
 from arto.core.patterns import pattern_set
 from arto.core.shot import Shot
+from arto.core.signed import parsed
 
 SECONDS, BYTES = 1.0, 200 * 2**20
 SHOT = Shot("Scene", 1, 3, 2, (1.0,) * 16, ("PERSP", 50.0))
@@ -76,7 +77,7 @@ def opened(kind: Callable[[Path], Any], folder: Path, text: str | bytes) -> str:
 
 def head_of(kind: type, folder: Path) -> dict[str, Any]:
     path = folder / ("capture.json" if kind is CaptureSet else "field.json")
-    return json.loads(path.read_text())
+    return parsed(path.read_text())
 
 
 NONE = (

@@ -32,10 +32,34 @@ def same(found: dict[str, np.ndarray], given: dict[str, np.ndarray]) -> None:
 def test_float_comes_back_to_the_bit(tmp_path: Path) -> None:
     given = layers()
     given["Depth"][0, :3] = np.nan, np.inf, -np.inf
-    exr.write(tmp_path / "a.exr", given)
+    exr.write(tmp_path / "a.exr", given, finite=False)
     same(exr.read(tmp_path / "a.exr"), given)
     assert exr.part_names(tmp_path / "a.exr") == list(given)
     assert [f.name for f in tmp_path.iterdir()] == ["a.exr"]
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_no_picture_is_written_with_what_is_no_number(tmp_path: Path, bad: float) -> None:
+    """Of no kind; the file that was there stays, and the message says where to look."""
+    path, plane = tmp_path / "a.exr", np.ones((3, 4), np.float32)
+    exr.write(path, {"": plane})
+    kept, wrong = path.read_bytes(), plane.copy()
+    wrong[1, 2] = bad
+    parts = {"position": {"Z": wrong}}
+    for write, layer in (
+        (lambda: exr.write(path, {"key": wrong}), "key.Y"),
+        (
+            lambda: exr.write_layered(path, np.ones((3, 4, 4)), {"sky": np.dstack([wrong] * 3)}),
+            "sky.R",
+        ),
+        (lambda: exr.write_planes(path, parts, {}), "position.Z"),
+    ):
+        with pytest.raises(
+            ExrError, match=f"'{layer}' is .* in 1 pixels, the first at row 1, column 2"
+        ):
+            write()
+    assert path.read_bytes() == kept
+    exr.write_planes(path, parts, {}, handed_on=["position"])
 
 
 def test_half_stays_half_and_double_becomes_float(tmp_path: Path) -> None:

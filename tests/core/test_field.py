@@ -25,6 +25,7 @@ from arto.core.light.light import PatchLight
 from arto.core.patterns import pattern_set
 from arto.core.region import Region
 from arto.core.relight import relight
+from arto.core.signed import parsed
 from arto.core.supports import BOX, LINEAR, NOTHING, REST, WHOLE
 
 CUBE = Hemicube(faces=("top", "back"), patches=2)
@@ -207,7 +208,7 @@ def field_folder(tmp_path: Path, capture: Path, fitted) -> Path:
 
 
 def test_another_version(field_folder: Path, refused) -> None:
-    head = json.loads((field_folder / HEADER).read_text())
+    head = parsed((field_folder / HEADER).read_text())
     for version in (VERSION + 1, 1, "3", 3.0, True, None):
         (field_folder / HEADER).write_text(json.dumps(head | {"version": version}))
         refused(
@@ -237,13 +238,13 @@ def test_a_damaged_header(field_folder: Path, refused, text: str) -> None:
 def test_a_header_that_lacks_something(
     field_folder: Path, refused, key: str, value: object
 ) -> None:
-    head = json.loads((field_folder / HEADER).read_text())
+    head = parsed((field_folder / HEADER).read_text())
     (field_folder / HEADER).write_text(json.dumps(head | {key: value}))
     refused(field_folder, HEADER)
 
 
 def test_a_model_of_the_future(field_folder: Path, refused) -> None:
-    head = json.loads((field_folder / HEADER).read_text())
+    head = parsed((field_folder / HEADER).read_text())
     head["tiles"][0]["entries"]["gauss"] = 3
     (field_folder / HEADER).write_text(json.dumps(head))
     refused(field_folder, "'gauss'", "update ARTO")

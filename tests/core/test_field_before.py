@@ -17,6 +17,7 @@ from arto.core.hemicube import Hemicube
 from arto.core.light.light import PatchLight
 from arto.core.region import Region
 from arto.core.relight import relight
+from arto.core.signed import parsed
 
 CUBE = Hemicube(faces=("top", "back"), patches=2)
 REGIONS = [Region(0, 0, 8, 4), Region(0, 4, 8, 6)]
@@ -40,7 +41,7 @@ def before(tmp_path: Path, now: Field, arrays_of) -> Path:
     for header in now.folder.rglob(HEADER):
         folder = tmp_path / "before" / header.parent.relative_to(now.folder)
         folder.mkdir(parents=True)
-        head = json.loads(header.read_text()) | {"version": 2}
+        head = parsed(header.read_text()) | {"version": 2}
         for entry in head["tiles"]:
             name = entry.pop("file")
             entry["folder"] = name.removesuffix(".arto")
@@ -70,9 +71,9 @@ def test_a_field_of_before_shows_the_same(before: Path, now: Field, noisy) -> No
 def test_a_field_whose_capture_went_on_in_this_version(before: Path, now: Field, noisy) -> None:
     """Its first tile is a folder, its second a file."""
     for header in before.rglob(HEADER):
-        head = json.loads(header.read_text())
+        head = parsed(header.read_text())
         there = now.folder / header.relative_to(before)
-        head["version"], head["tiles"][1] = 3, json.loads(there.read_text())["tiles"][1]
+        head["version"], head["tiles"][1] = 3, parsed(there.read_text())["tiles"][1]
         name = head["tiles"][1]["file"]
         (header.parent / name).write_bytes((there.parent / name).read_bytes())
         header.write_text(json.dumps(head))
@@ -108,14 +109,14 @@ def test_a_pipe_in_an_array_of_before_is_not_waited_for(before: Path, refused) -
     path = before / "tile_0000" / "peaks.npy"
     path.unlink()
     os.mkfifo(path)
-    done = threading.Thread(target=refused, args=(before, "it is no file"), daemon=True)
+    done = threading.Thread(target=refused, args=(before, "is no regular file"), daemon=True)
     done.start()
     done.join(30)
     assert not done.is_alive()
 
 
 def test_a_field_of_before_that_is_older_is_refused_in_a_sentence(before: Path) -> None:
-    head = json.loads((before / HEADER).read_text())
+    head = parsed((before / HEADER).read_text())
     (before / HEADER).write_text(json.dumps(head | {"version": 1}))
     with pytest.raises(FieldError, match=r"a field of version 1; .* fit again from the capture"):
         Field(before)

@@ -17,6 +17,7 @@ from arto.core.field.writer import write_head
 from arto.core.hemicube import Hemicube
 from arto.core.region import Region
 from arto.core.shot import Shot
+from arto.core.signed import parsed
 
 SHOT = Shot("Scene", 3, 64, 48, (1.0,) * 16, ("PERSP", 50.0), file="shot")
 ABOUT = About(
@@ -61,7 +62,7 @@ def test_a_head_comes_back(tmp_path: Path) -> None:
 def test_the_keys_on_disk_are_those_of_the_page(tmp_path: Path) -> None:
     """Programs of others read them, and so do fields of before."""
     write_head(tmp_path, HEAD)
-    said = json.loads((tmp_path / "field.json").read_text())
+    said = parsed((tmp_path / "field.json").read_text())
     assert said == {
         "format": "ARTO reflectance field",
         "version": 3,
