@@ -26,7 +26,7 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,11 +149,11 @@ class TileFileWriter:
 
     Parameters
     ----------
-    file : BinaryIO
+    file : IO[bytes]
         Open to be written, and empty.
     """
 
-    def __init__(self, file: BinaryIO) -> None:
+    def __init__(self, file: IO[bytes]) -> None:
         self._file = file
         self._stored: list[Stored] = []
         file.write(bytes(ALIGNED))
@@ -187,14 +187,14 @@ class TileFileWriter:
         size = (array.nbytes, checksum.crc32(data))
         self._stored.append(Stored(name, kind, array.shape, offset, *size))
 
-    def copy(self, stored: Stored, source: BinaryIO, path: Path) -> None:
+    def copy(self, stored: Stored, source: IO[bytes], path: Path) -> None:
         """Write an array as it is in another tile's file.
 
         Parameters
         ----------
         stored : Stored
             The array.
-        source : BinaryIO
+        source : IO[bytes]
             The file that has it, open.
         path : Path
             Of that file, for messages.
@@ -293,7 +293,7 @@ def _damaged(path: Path, why: object) -> FieldError:
 
 
 @contextlib.contextmanager
-def _opened(path: Path) -> Iterator[BinaryIO]:
+def _opened(path: Path) -> Iterator[IO[bytes]]:
     """The file, to be read. Raises FieldError where there is none."""
     try:
         # a pipe or a device in its place would be waited for
@@ -304,7 +304,7 @@ def _opened(path: Path) -> Iterator[BinaryIO]:
         yield file
 
 
-def _mapped(file: BinaryIO) -> mmap.mmap:
+def _mapped(file: IO[bytes]) -> mmap.mmap:
     """All of a file as memory that is read as it is used."""
     options: dict[str, Any] = {"access": mmap.ACCESS_READ}
     if sys.version_info >= (3, 13) and sys.platform != "win32":
@@ -313,7 +313,7 @@ def _mapped(file: BinaryIO) -> mmap.mmap:
     return mmap.mmap(file.fileno(), 0, **options)
 
 
-def _index(file: BinaryIO, path: Path) -> dict[str, Stored]:
+def _index(file: IO[bytes], path: Path) -> dict[str, Stored]:
     """The arrays of a file by their names. Raises FieldError where they cannot be."""
     try:
         size = file.seek(0, 2)
