@@ -20,7 +20,6 @@ from ...core.capture.kinds import Keep, Route, Take
 from ...core.capture.tile_entry import TileEntry
 from ...core.errors import SceneError
 from ...core.hemicube import Hemicube
-from ...core.patterns import pattern_set
 from ...core.region import Region
 from ...core.shot import Shot
 from ..blender.colour import working_space
@@ -35,6 +34,7 @@ from ..stage.stage import Stage, picture_region, stage
 from ..stage.takes import THINGS, WHOLE, only_things, take
 from ..work import Steps
 from . import planes
+from .patterns import patterns_of
 from .planned import Given, Planned, planned
 
 
@@ -91,7 +91,7 @@ def asked(
         otherwise = held.enter_context(take(seen, name))
         hemicube = given.hemicube if given else geometry(scene, seen)
         # other routes need several renders, whose paths differ: no grain belongs to all
-        patterns = pattern_set(settings.patterns)
+        patterns = patterns_of(settings, given.route if given else None)
         # packed patterns have theirs
         grain = settings.grain and settings.route == Route.ALL and patterns.grey
         prepare(on, layers=len(patterns) + grain)
@@ -156,6 +156,7 @@ def begun(
         hemicube=plan.hemicube,
         tiles=tuple(TileEntry(region) for region in plan.tiles),
         key=this.key,
+        patterns=plan.patterns,
         route=plan.route,
         grain=plan.grain,
         kept=plan.kept,

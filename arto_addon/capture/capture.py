@@ -19,7 +19,6 @@ from ...core.capture.tile_entry import sums_of
 from ...core.errors import ArtoError, CaptureSetError
 from ...core.files import Lock, whole
 from ...core.fit.choice import check as check_choice
-from ...core.patterns import pattern_set
 from ..blender.output import write_to
 from ..fit.guides import cleaned
 from ..shot import paths
@@ -30,6 +29,7 @@ from ..work import Progress, Render, Steps
 from . import beside, planes
 from .asked import Asked, asked, begun
 from .check import check_scene
+from .patterns import patterns_of
 from .plan import render_plan
 from .planned import Given, Planned
 from .resume import empty, empty_take, finish, finish_field, let_go, unfinished
@@ -88,7 +88,7 @@ def _claimed(scene: bpy.types.Scene, view_layer: str) -> Iterator[Path]:
     # let the scene follow what a script has moved
     scene.view_layers[view_layer].update()
     if scene.arto.keep == Keep.NEVER:
-        check_choice(scene.arto.support, pattern_set(scene.arto.patterns), scene.arto.separate)
+        check_choice(scene.arto.support, patterns_of(scene.arto), scene.arto.separate)
     claimed = paths.claim(scene, view_layer)
     with Lock(claimed, f"capturing {shot_of(scene, view_layer).title}"):
         yield claimed

@@ -17,7 +17,7 @@ from ...core.capture.refine import check as can_refine
 from ...core.errors import ArtoError, SceneError
 from ...core.fit.choice import check as check_choice
 from ...core.hemicube import Hemicube
-from ...core.patterns import LobedSet, pattern_set
+from ...core.patterns import LobedSet, PatternSet
 from ...core.region import Region
 from ...core.units import size
 from ..stage.settings import samples_of
@@ -25,6 +25,7 @@ from ..stage.stage import Stage, picture_region
 from ..work import Progress, Steps
 from . import planes, room
 from .light_check import check_light
+from .patterns import patterns_of
 from .plan import render_plan, strips_of, tiles_of
 from .probe import refined
 from .room import Estimate
@@ -50,6 +51,7 @@ class Planned:
     """What a capture will be, before its first long render."""
 
     hemicube: Hemicube
+    patterns: PatternSet
     route: Route
     grain: bool
     kept: bool
@@ -83,14 +85,15 @@ def planned(
         route, caution = yield from light_route(on, hemicube)
         if settings.adaptive and route != Route.SAMPLED:
             hemicube = yield from refined(on, hemicube, ADAPTIVE_SHARE * len(hemicube))
-    if route == Route.SAMPLED and isinstance(pattern_set(settings.patterns), LobedSet):
+    patterns = patterns_of(settings, route)
+    if route == Route.SAMPLED and isinstance(patterns, LobedSet):
         # a patch that is hidden from diffuse rays lights nothing diffuse by shadow rays
         raise SceneError(
             "light comes into this scene by shadow rays alone, of which the patterns 'Packed, by "
             "Lobe' know nothing: choose the patterns '1, u, v'"
         )
     grain = grain and route == Route.ALL
-    names = [*pattern_set(settings.patterns).patterns, *([GRAIN] if grain else [])]
+    names = [*patterns.patterns, *([GRAIN] if grain else [])]
     plan = [len(images) for images in render_plan(route, hemicube, names)]
     budget = room.budget(settings.memory)
 
@@ -110,12 +113,12 @@ def planned(
     tiles, estimate = estimated(kept)
     if settings.keep == Keep.FITS and estimate.kept > settings.keep_limit * 1e9:
         kept = False
-        check_choice(settings.support, pattern_set(settings.patterns), settings.separate)
+        check_choice(settings.support, patterns, settings.separate)
         tiles, estimate = estimated(kept)
     yield Progress(0.0, f"this capture: {estimate.line}")
     room.check_memory(estimate.memory, "this capture")
     room.check_disk(folder, estimate.disk, "this capture")
-    return Planned(hemicube, route, grain, kept, caution, tiles, estimate)
+    return Planned(hemicube, patterns, route, grain, kept, caution, tiles, estimate)
 
 
 def light_route(on: Stage, hemicube: Hemicube) -> Steps[tuple[Route, Caution | None]]:
@@ -136,7 +139,7 @@ def most(scene: bpy.types.Scene) -> Estimate:
     settings = scene.arto
     hemicube = planes.wanted(scene, (0.0, 0.0, 0.0), 1.0)
     patches = len(hemicube) * (ADAPTIVE_SHARE if settings.adaptive else 1)
-    images = patches * (len(pattern_set(settings.patterns)) + settings.grain)
+    images = patches * (len(patterns_of(settings)) + settings.grain)
     fitted = settings.keep == Keep.NEVER
     bytes_a_pixel = room.bytes_a_pixel(images, patches, fitted)
     tiles = tiles_of(picture_region(scene), bytes_a_pixel, room.budget(settings.memory))

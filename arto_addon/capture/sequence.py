@@ -18,7 +18,6 @@ from ...core.capture.kinds import Route
 from ...core.capture.refine import check as can_refine
 from ...core.capture.refine import refine
 from ...core.errors import SceneError
-from ...core.patterns import pattern_set
 from ..stage.bounds import Rendered, rendered
 from ..stage.settings import prepare
 from ..stage.stage import stage
@@ -27,6 +26,7 @@ from ..work import Progress, Steps, part_of
 from . import planes, probe
 from .capture import capture
 from .check import check_scene
+from .patterns import patterns_of
 from .planned import ADAPTIVE_SHARE, Given, light_route
 
 
@@ -80,7 +80,7 @@ def together(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> 
     for frame in some:
         scene.frame_set(frame)
         with stage(scene, view_layer) as on, take(rendered(on), WHOLE):
-            prepare(on, layers=len(pattern_set(settings.patterns)) + settings.grain)
+            prepare(on, layers=len(patterns_of(settings)) + settings.grain)
             here, told = yield from light_route(on, hemicube)
             route = Route.SAMPLED if here == Route.SAMPLED else route
             caution = caution or told

@@ -18,12 +18,12 @@ from ...core.capture.head import CaptureHead
 from ...core.capture.kinds import Take
 from ...core.errors import CaptureSetError, FarmError
 from ...core.fit.choice import check as check_choice
-from ...core.patterns import pattern_set
 from ...core.units import size
 from ..capture import room
 from ..capture.asked import asked, begun
 from ..capture.beside import given_by
 from ..capture.check import check_scene
+from ..capture.patterns import patterns_of
 from ..capture.planned import Given
 from ..capture.sequence import frame_kept, together
 from ..shot import home
@@ -58,7 +58,7 @@ def plan(
             f"{folder} has a job with parts that were rendered: gather it, remove it, or plan into "
             "another folder"
         )
-    check_choice(scene.arto.support, pattern_set(scene.arto.patterns), scene.arto.separate)
+    check_choice(scene.arto.support, patterns_of(scene.arto), scene.arto.separate)
     _make_way(folder, [scene.frame_current] if frames is None else list(frames))
     # as with `capture`, a single frame keeps its subframe; as with `capture_frames`, several do not
     several = frames is not None

@@ -22,6 +22,10 @@ _PATTERNS = {
         "Packed, by Lobe",
         "Packed patterns of what reflects and refracts, and of what scatters, each by itself",
     ),
+    "auto": (
+        "Automatic",
+        "Packed, by Lobe, wherever the fit chooses its models; else the fewest that it needs",
+    ),
     "paper": ("Paper's nine", "White, four diagonal gradients and their inverses"),
     "white": ("White only", "One pattern: a reflection coefficient and no support"),
 }
@@ -217,8 +221,9 @@ CAPTURE = (
         kind="choice",
         title="Patterns",
         words="What the patches show",
-        items=tuple(_item(name, _PATTERNS) for name in PATTERN_SETS),
-        default="linear",
+        # the newest item stands last: files keep an item by its number
+        items=tuple(_item(name, _PATTERNS) for name in (*PATTERN_SETS, "auto")),
+        default="auto",
         work="capture",
         decides=Decides.CAPTURE_MADE,
         farm=True,
