@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 import bpy
 
 from ..core.errors import CancelledError, SceneError
+from .blender import interrupt
 
 STOPPED = "cancelled: finished tiles are kept, run it again to go on"
 
@@ -145,11 +146,14 @@ def run(steps: Steps[_Made], say: Callable[[Progress | Render], None] | None = N
     def do(step: Progress | Render) -> None:
         if say:
             say(step)
+        if told.came:
+            raise CancelledError(STOPPED)
         if isinstance(step, Render):
             blocking_render(step)
 
     try:
-        return driven(steps, do)
+        with interrupt.noted() as told:
+            return driven(steps, do)
     except KeyboardInterrupt:
         raise CancelledError(STOPPED) from None
 
