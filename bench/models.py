@@ -33,10 +33,12 @@ OUT = Path("out/models")
 PACKAGE = Path(arto.__file__).parent
 # The code that decides what a capture set holds.
 DECIDES = [
-    p for n in ("capture", "stage") for p in sorted((PACKAGE / "arto_addon" / n).glob("*.py"))
+    p
+    for place in ("arto_addon/capture", "arto_addon/stage", "arto_addon/settings")
+    + ("core/capture", "core/patterns")
+    for p in sorted((PACKAGE / place).glob("*.py"))
 ]
-DECIDES += [PACKAGE / "core" / f"{n}.py" for n in ("refine", "hemicube", "patterns")]
-DECIDES += [PACKAGE / "arto_addon" / "ui" / "properties.py"]
+DECIDES.append(PACKAGE / "core" / "hemicube.py")
 STAGE = "whole 16x16"
 MATTE = "matte"
 AUTO_RGB = "auto per channel"
