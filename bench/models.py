@@ -31,14 +31,15 @@ from .worlds import World
 
 OUT = Path("out/models")
 PACKAGE = Path(arto.__file__).parent
-# The code that decides what a capture set holds.
+# The rooms of the code that decides what a capture set holds.
+ROOMS = (
+    *("arto_addon/capture", "arto_addon/stage", "arto_addon/settings"),
+    *("core/capture", "core/patterns"),
+)
 DECIDES = [
-    p
-    for place in ("arto_addon/capture", "arto_addon/stage", "arto_addon/settings")
-    + ("core/capture", "core/patterns")
-    for p in sorted((PACKAGE / place).glob("*.py"))
+    PACKAGE / "core" / "hemicube.py",
+    *(p for room in ROOMS for p in sorted((PACKAGE / room).glob("*.py"))),
 ]
-DECIDES.append(PACKAGE / "core" / "hemicube.py")
 STAGE = "whole 16x16"
 MATTE = "matte"
 AUTO_RGB = "auto per channel"
