@@ -10,7 +10,7 @@ Examples
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 
@@ -26,6 +26,8 @@ from .region import Region
 
 # The most lights that are added up at a time, and the most bytes that their pictures take.
 TOGETHER, PICTURES = 24, 1 << 30
+# So many entries of models that are no planes are evaluated at a time: they fit the cache.
+AT_ONCE = 1 << 12
 
 
 def together(field: Field) -> int:
@@ -169,8 +171,8 @@ def _one_by_one(
         for i, (light, of) in enumerate(zip(lights, tables, strict=True)):
             total = np.zeros((where.stop - where.start, 4), np.float32)
             for model in tile.models:
-                for k in np.flatnonzero(model.counts[block]).tolist():
-                    room.add(total, model, block, k, light)
+                for some in _groups(model, block, light):
+                    room.add(total, model, block, some, light)
             found = total[:, :3] * ones
             if of is not None:
                 found += _rest_light(tile, of, where)
@@ -197,8 +199,8 @@ def _together(
                 continue
             for i, light in enumerate(lights):
                 alone = np.zeros((n, 4), np.float32)
-                for k in np.flatnonzero(model.counts[block]).tolist():
-                    room.add(alone, model, block, k, light)
+                for some in _groups(model, block, light):
+                    room.add(alone, model, block, some, light)
                 total[:, i] += alone[:, :3].T
         total *= tile.ones(where).T[:, None]
         rest = every.rest(where)
@@ -232,17 +234,23 @@ class _Room:
         return self._parts[name][: rows * n].reshape(rows, n)
 
     def add(
-        self, total: NDArray[np.float32], model: Model, block: int, k: int, light: PatchLight
+        self,
+        total: NDArray[np.float32],
+        model: Model,
+        block: int,
+        some: list[int],
+        light: PatchLight,
     ) -> None:
-        """Add the light of patch k's entries to a block, (n, 4), in units of its `ones`."""
-        at = model.at(block, k)
+        """Add the light of some patches' entries to a block, (n, 4), in units of its `ones`."""
+        at = slice(model.at(block, some[0]).start, model.at(block, some[-1]).stop)
         n = at.stop - at.start
         values = self._part("values", 3, n)
         values[...] = model.codes[:, at]
         values *= values
-        plane = model.support.plane(light, k)
+        plane = model.support.plane(light, some[0])
         if plane is None:
-            averages = model.support.average(light, k, model.parameters_of(at)).T
+            of = np.repeat(some, model.counts[block, some])
+            averages = model.support.average(light, of, model.parameters_of(at)).T
             values *= np.maximum(averages, self._least)
         else:
             constant, slopes = plane
@@ -254,7 +262,17 @@ class _Room:
             if self._least == 0:
                 np.maximum(averages, 0, out=averages)
             values *= averages
-        pixels = model.pixels(block, k)
+        done = 0
+        for k in some:
+            pixels = model.pixels(block, k)
+            self._put(total, pixels, values[:, done : done + len(pixels)])
+            done += len(pixels)
+
+    def _put(
+        self, total: NDArray[np.float32], pixels: NDArray, values: NDArray[np.float32]
+    ) -> None:
+        """Add values (3, n) to pixels (n,) that are each another one."""
+        n = len(pixels)
         # the same as `total[pixels] += values.T`, but each pixel moves as one number of 16 bytes;
         # with mode="clip" numpy makes no copy
         sums = self._part("sums", n, 4)
@@ -263,6 +281,25 @@ class _Room:
         for c in range(3):
             sums[:, c] += values[c]
         places[pixels] = ones
+
+
+def _groups(model: Model, block: int, light: PatchLight) -> Iterator[list[int]]:
+    """The patches that have entries in a block, in groups that are evaluated at once."""
+    counts = model.counts[block]
+    there = np.flatnonzero(counts)
+    if not len(there):
+        return
+    # a plane is each patch's own; the others are short, so that most of their time would be calls
+    alone = model.support.plane(light, int(there[0])) is not None
+    group, n = [], 0
+    for k in there.tolist():
+        group.append(k)
+        n += int(counts[k])
+        if alone or n >= AT_ONCE:
+            yield group
+            group, n = [], 0
+    if group:
+        yield group
 
 
 def _rest_tables(tile: Tile, light: PatchLight) -> NDArray[np.float32] | None:

@@ -235,18 +235,16 @@ class PatchLight:
             bin_coordinate(self.hemicube, k, v1, 1, r),
             r,
         )
-        total = self._sum_to(k, i1, j1)
-        total -= self._sum_to(k, i0, j1)
-        total -= self._sum_to(k, i1, j0)
-        total += self._sum_to(k, i0, j0)
+        total = self._sums_between(k, i0, i1, j0, j1)
         return total[:, :3] / total[:, 3:]
 
-    def point(self, k: int, u: NDArray, v: NDArray) -> NDArray[np.float64]:
+    def point(self, k: int | NDArray, u: NDArray, v: NDArray) -> NDArray[np.float64]:
         """Average the light of a patch over boxes that are no wider than a bin, see `box`.
 
         Parameters
         ----------
-        k : int
+        k : int or (n,) int
+            The numbers of the patches.
         u, v : (n,) float
             The middles of the boxes, in patch coordinates.
 
@@ -255,36 +253,46 @@ class PatchLight:
         (n, 3) float64
             Scene-linear radiance.
         """
-        r = int(self.resolutions[k])
+        r = self.resolutions[k]
         i, fi = _between(bin_coordinate(self.hemicube, k, u, 0, r), r)
         j, fj = _between(bin_coordinate(self.hemicube, k, v, 1, r), r)
-        flat = self._flat[self._offsets[k] : self._offsets[k + 1]]
-        at, right, up = j * r + i, min(1, r - 1), r * min(1, r - 1)
-        total: NDArray[np.float64] = flat[at] * ((1 - fi) * (1 - fj))[:, None]
-        total += flat[at + right] * (fi * (1 - fj))[:, None]
-        total += flat[at + up] * ((1 - fi) * fj)[:, None]
-        total += flat[at + up + right] * (fi * fj)[:, None]
+        flat, right = self._flat, np.minimum(1, r - 1)
+        at, up = self._offsets[k] + j * r + i, r * right
+        total: NDArray[np.float64] = flat.take(at, axis=0)
+        total *= ((1 - fi) * (1 - fj))[:, None]
+        total += flat.take(at + right, axis=0) * (fi * (1 - fj))[:, None]
+        total += flat.take(at + up, axis=0) * ((1 - fi) * fj)[:, None]
+        total += flat.take(at + up + right, axis=0) * (fi * fj)[:, None]
         return total[:, :3] / total[:, 3:]
 
-    def _sum_to(self, k: int | NDArray, i: NDArray, j: NDArray) -> NDArray[np.float64]:
-        """Look up the table between its entries: bilinear, which is exact for light constant in a
-        bin.
+    def _sums_between(
+        self, k: int | NDArray, i0: NDArray, i1: NDArray, j0: NDArray, j1: NDArray
+    ) -> NDArray[np.float64]:
+        """The sums (n, 4) over boxes in bin coordinates.
+
+        Between its entries the table is read bilinearly, which is exact for light that is constant
+        in a bin.
         """
-        r = self.resolutions[k]
-        table = self._sat
-        a = np.minimum(i.astype(np.int64), r - 1)
-        b = np.minimum(j.astype(np.int64), r - 1)
-        fi = (i - a)[:, None]
-        fj = (j - b)[:, None]
-        at = self._tables[k] + b * (r + 1) + a
-        low = table[at]
-        low += fi * (table[at + 1] - low)
-        high = table[at + r + 1]
-        high += fi * (table[at + r + 2] - high)
+        n, r, table = len(i0), self.resolutions[k], self._sat
+        # all four corners at once: so short are most boxes' arrays that each call has its price
+        corners = np.concatenate([i0, i1, i0, i1, j0, j0, j1, j1]).reshape(2, 4, n)
+        whole = np.minimum(corners.astype(np.intp), r - 1)
+        fi, fj = (corners - whole)[..., None]
+        row = r + 1
+        at = self._tables[k] + whole[1] * row + whole[0]
+        low, high = table.take(at, axis=0), table.take(at + row, axis=0)
+        for side, first in ((low, at + 1), (high, at + row + 1)):
+            step = table.take(first, axis=0)
+            step -= side
+            step *= fi
+            side += step
         high -= low
         high *= fj
         low += high
-        return low
+        total: NDArray[np.float64] = low[3] - low[2]
+        total -= low[1]
+        total += low[0]
+        return total
 
 
 def _turned(samples: NDArray, turn: float) -> NDArray:
@@ -307,16 +315,16 @@ def _starts(sizes: NDArray) -> NDArray[np.intp]:
     return np.concatenate([[0], np.cumsum(sizes)]).astype(np.intp)
 
 
-def _between(at: NDArray, r: int) -> tuple[NDArray[np.intp], NDArray]:
+def _between(at: NDArray, r: NDArray | int) -> tuple[NDArray[np.intp], NDArray]:
     """The lower of the two bins that a bin's width about a coordinate meets, and how much of it is
     in the other."""
-    at = np.clip(at - 0.5, 0, r - 1)
-    low = np.minimum(at.astype(np.intp), max(r - 2, 0))
+    at = np.minimum(np.maximum(at - 0.5, 0), r - 1)
+    low = np.minimum(at.astype(np.intp), np.maximum(r - 2, 0))
     return low, at - low
 
 
 def _at_least_one_bin(low: NDArray, high: NDArray, r: NDArray | int) -> tuple[NDArray, NDArray]:
-    low, high = np.clip(low, 0, r), np.clip(high, 0, r)
-    centre = np.clip((low + high) / 2, 0.5, r - 0.5)
+    low, high = np.minimum(np.maximum(low, 0), r), np.minimum(np.maximum(high, 0), r)
+    centre = np.minimum(np.maximum((low + high) / 2, 0.5), r - 0.5)
     thin = high - low < 1
     return np.where(thin, centre - 0.5, low), np.where(thin, centre + 0.5, high)

@@ -53,14 +53,14 @@ class Support(Protocol):
         """
         ...
 
-    def average(self, light: PatchLight, k: int, parameters: NDArray) -> NDArray:
-        """Compute <S, L>: the light of a patch averaged over supports.
+    def average(self, light: PatchLight, k: int | NDArray, parameters: NDArray) -> NDArray:
+        """Compute <S, L>: the light of patches averaged over supports.
 
         Parameters
         ----------
         light : PatchLight
-        k : int
-            The number of the patch.
+        k : int or (n,) int
+            The number of the patch, or of each support's.
         parameters : (n, p) float
 
         Returns

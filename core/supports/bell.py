@@ -40,21 +40,24 @@ class Bell:
     def fit(self, moments: Moments) -> NDArray:
         return box_of(moments.mean, moments.variance, moments.extent)
 
-    def average(self, light: PatchLight, k: int, parameters: NDArray) -> NDArray:
+    def average(self, light: PatchLight, k: int | NDArray, parameters: NDArray) -> NDArray:
         u0, u1, v0, v1 = parameters.astype(np.float64).T
         # what is thinner than a bin of the light, as most mirror images are, is one look-up
         thin = np.maximum(u1 - u0, v1 - v0) * STACK[-1] * light.resolutions[k] < 1
         out = np.empty((len(parameters), 3))
-        out[thin] = light.point(k, ((u0 + u1) / 2)[thin], ((v0 + v1) / 2)[thin])
+        several = isinstance(k, np.ndarray)
+        of = k[thin] if several else k
+        out[thin] = light.point(of, ((u0 + u1) / 2)[thin], ((v0 + v1) / 2)[thin])
         wide = ~thin
         u, across, round_u = _middle(u0[wide], u1[wide])
         v, along, round_v = _middle(v0[wide], v1[wide])
-        total: NDArray[np.float64] = np.zeros((len(u), 3))
-        for share in STACK:
-            a = across * (1 + round_u * (share - 1))
-            b = along * (1 + round_v * (share - 1))
-            total += light.box(k, u - a, u + a, v - b, v + b)
-        out[wide] = total / len(STACK)
+        a = np.multiply.outer(STACK - 1, round_u) + 1
+        b = np.multiply.outer(STACK - 1, round_v) + 1
+        a *= across
+        b *= along
+        edges = ((u - a).ravel(), (u + a).ravel(), (v - b).ravel(), (v + b).ravel())
+        of = np.tile(k[wide], len(STACK)) if several else k
+        out[wide] = light.box(of, *edges).reshape(len(STACK), -1, 3).mean(axis=0)
         return out
 
     def plane(self, light: PatchLight, k: int) -> None:

@@ -35,7 +35,7 @@ class Box:
     def fit(self, moments: Moments) -> NDArray:
         return box_of(moments.mean, moments.variance, moments.extent)
 
-    def average(self, light: PatchLight, k: int, parameters: NDArray) -> NDArray:
+    def average(self, light: PatchLight, k: int | NDArray, parameters: NDArray) -> NDArray:
         u0, u1, v0, v1 = parameters.astype(np.float64).T
         return light.box(k, u0, u1, v0, v1)
 

@@ -71,7 +71,7 @@ class Double:
             own = averages[UV] - averages[U] * averages[V]
         return np.clip(np.concatenate([share[:, None], boxes], axis=-1), 0, 1)
 
-    def average(self, light: PatchLight, k: int, parameters: NDArray) -> NDArray:
+    def average(self, light: PatchLight, k: int | NDArray, parameters: NDArray) -> NDArray:
         share, u0, u1, v0, v1 = parameters.astype(np.float64).T
         share = share[:, None]
         return share * light.box(k, u0, u1, v0, v1) + (1 - share) * light.whole[k]

@@ -41,7 +41,7 @@ class PerChannel:
     def fit(self, moments: Moments) -> NDArray:
         return np.concatenate([self.base.fit(m) for m in moments.channels], axis=-1)
 
-    def average(self, light: PatchLight, k: int, parameters: NDArray) -> NDArray:
+    def average(self, light: PatchLight, k: int | NDArray, parameters: NDArray) -> NDArray:
         p = len(self.base.parameters)
         return np.stack(
             [

@@ -33,9 +33,10 @@ class Quadratic:
     def fit(self, moments: Moments) -> NDArray:
         return moments.normalised[[U, UU, V, VV]].T
 
-    def average(self, light: PatchLight, k: int, parameters: NDArray) -> NDArray:
-        constant, slopes = self.plane(light, k)
-        return parameters.astype(np.float32, copy=False) @ slopes.T + constant
+    def average(self, light: PatchLight, k: int | NDArray, parameters: NDArray) -> NDArray:
+        of = light.polynomial(self.needs)[k].astype(np.float32)
+        slopes = np.matmul(parameters[:, None].astype(np.float32, copy=False), of[..., 1:, :])
+        return slopes[:, 0] + of[..., 0, :]
 
     def plane(self, light: PatchLight, k: int) -> tuple[NDArray, NDArray]:
         constant, *slopes = light.polynomial(self.needs)[k].astype(np.float32)

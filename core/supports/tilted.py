@@ -63,7 +63,7 @@ class _Tilted:
         correlation = np.clip(correlation, -1, 1)
         return np.stack([mu, mv, 2 * du, 2 * dv, (correlation + 1) / 2], axis=-1)
 
-    def average(self, light: PatchLight, k: int, parameters: NDArray) -> NDArray:
+    def average(self, light: PatchLight, k: int | NDArray, parameters: NDArray) -> NDArray:
         mu, mv, du, dv, tilt = parameters.astype(np.float64).T
         a, c = (du / 2) ** 2, (dv / 2) ** 2
         b = (2 * tilt - 1) * np.sqrt(a * c)

@@ -29,7 +29,7 @@ class Whole:
     def fit(self, moments: Moments) -> NDArray:
         return np.empty((len(moments.coefficient), 0), np.float32)
 
-    def average(self, light: PatchLight, k: int, parameters: NDArray) -> NDArray:
+    def average(self, light: PatchLight, k: int | NDArray, parameters: NDArray) -> NDArray:
         return np.broadcast_to(light.whole[k], (len(parameters), 3))
 
     def plane(self, light: PatchLight, k: int) -> tuple[NDArray, NDArray]:

@@ -10,7 +10,7 @@ from arto.core.light.bins import bin_coordinate
 from arto.core.light.environment import Environment
 from arto.core.light.light import PatchLight
 from arto.core.patterns import ONE, UU, UV, VV, U, V
-from arto.core.supports import BOX, LINEAR, WHOLE
+from arto.core.supports import BOX, LINEAR, SUPPORTS, WHOLE
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -117,8 +117,7 @@ def test_halves_make_the_whole(noisy) -> None:
         def both(*box: float, k: int = k) -> np.ndarray:
             i0, i1 = (bin_coordinate(light.hemicube, k, np.array([t]), 0, 16) for t in box[:2])
             j0, j1 = (bin_coordinate(light.hemicube, k, np.array([t]), 1, 16) for t in box[2:])
-            s = light._sum_to
-            weight = (s(k, i1, j1) - s(k, i0, j1) - s(k, i1, j0) + s(k, i0, j0))[0, 3]
+            weight = light._sums_between(k, i0, i1, j0, j1)[0, 3]
             average = light.box(k, *(np.array([t]) for t in box))[0]
             return np.append(average * weight, weight)
 
@@ -202,3 +201,16 @@ def test_a_thin_box_at_the_rim_sees_the_bin_there(noisy) -> None:
             us, vs = np.full(len(cube), u), np.full(len(cube), v)
             found = light.box(k, us, us, vs, vs)
             np.testing.assert_allclose(found, radiance[:, j, i], rtol=1e-9)
+
+
+def test_entries_of_several_patches_are_those_of_each(noisy) -> None:
+    """Asked together or patch by patch, every model averages the same."""
+    light = PatchLight(noisy(5), Hemicube())
+    k, rng = np.repeat([3, 40, 81], 5), np.random.default_rng(4)
+    for support in SUPPORTS.values():
+        parameters = np.sort(rng.random((15, len(support.parameters))), axis=1)
+        parameters[::2] = parameters[::2, :1] if parameters.shape[1] == 4 else parameters[::2]
+        each = [
+            support.average(light, int(n), p[None])[0] for n, p in zip(k, parameters, strict=True)
+        ]
+        np.testing.assert_allclose(support.average(light, k, parameters), each, rtol=1e-5)
