@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import bpy
 
 from ..core.errors import CancelledError, SceneError
-from .blender import interrupt
+from . import interrupt
 
 STOPPED = "cancelled: finished tiles are kept, run it again to go on"
 
