@@ -94,8 +94,8 @@ FLOW = {
     < region < file_names < description < values < shot < metrics < patterns < measure < faces
     < partition < hemicube < exr < cryptomatte < capture < light < supports < field < fit < lights
     < relight < catcher < preview < inside < verify""",
-    "arto_addon": """interrupt < work < settings < blender < stage < shot < world < plate < fit < capture
-    < relight < shoot < job < live < farm < ui""",
+    "arto_addon": """interrupt < work < settings < blender < stage < shot < world < plate < fit
+    < capture < relight < shoot < job < live < farm < ui""",
 }
 
 
