@@ -8,14 +8,15 @@ cleans up in its own `finally`, however the work ends.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, TypeVar
 
 import bpy
 
-from ..core.errors import CancelledError, SceneError
+from ..core.errors import ArtoError, CancelledError, SceneError, StrictError
 from . import interrupt
 
 STOPPED = "cancelled: finished tiles are kept, run it again to go on"
@@ -27,6 +28,31 @@ class Progress:
 
     share: float
     text: str
+
+
+@dataclass
+class Warned(Progress):
+    """A warning: the work goes on, but what it makes may not be what the artist wants.
+
+    of: which picture or frame of a larger work; "" for the work as a whole.
+    """
+
+    of: str = ""
+
+
+@dataclass
+class Wrote(Progress):
+    """A file or folder was written and is complete. path: where it is."""
+
+    path: Path = field(default_factory=Path)
+
+
+@dataclass
+class Failed(Progress):
+    """A picture or frame of a larger work failed. of: which one; error: why."""
+
+    of: str = ""
+    error: ArtoError | None = None
 
 
 @dataclass
@@ -135,6 +161,71 @@ def part_of(steps: Steps[_Made], begin: float, span: float, title: str = "") -> 
         return step
 
     return retold(steps, change)
+
+
+def strictly(steps: Steps[_Made]) -> Steps[_Made]:
+    """Pass on the steps of a piece of work; a warning ends the work. Raises StrictError."""
+
+    def change(step: Progress | Render) -> Progress | Render:
+        if isinstance(step, Warned):
+            raise StrictError(f"{step.text} (a warning, and with --strict that is an error)")
+        return step
+
+    return retold(steps, change)
+
+
+def of_one(steps: Steps[_Made], name: str, share: float) -> Steps[_Made]:
+    """Run one of many similar pieces of work without its progress, which would be lost among many.
+
+    What was written, warned of and failed is passed on, and so are renders. name: of the piece, for
+    its warnings; share: how much of the whole work is done.
+    """
+
+    def change(step: Progress | Render) -> Progress | Render | None:
+        if isinstance(step, Warned):
+            step.of = step.of or name
+        elif isinstance(step, Progress) and not isinstance(step, Wrote | Failed):
+            return None
+        step.share = share
+        return step
+
+    return retold(steps, change)
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What a failure and a warning mean in a work of many pieces.
+
+    keep_going: whether the other pieces are done where one failed; strict: whether a piece with a
+    warning has failed.
+    """
+
+    keep_going: bool = False
+    strict: bool = False
+
+
+PLAIN = Batch()
+
+
+def failed(names: Iterable[str], error: ArtoError, share: float, batch: Batch) -> Iterator[Failed]:
+    """Tell that pieces of a work failed. Raises the error, unless the batch keeps going."""
+    if not batch.keep_going or isinstance(error, CancelledError):
+        raise error
+    for name in names:
+        yield Failed(share, f"{name} failed: {error}", name, error)
+
+
+def tried(steps: Steps[_Made], name: str, share: float, batch: Batch) -> Steps[_Made | None]:
+    """Do one of many similar pieces of work, see `of_one` -> what it returns; None if it failed.
+
+    Raises the piece's error, unless the batch keeps going.
+    """
+    steps = of_one(steps, name, share)
+    try:
+        return (yield from strictly(steps) if batch.strict else steps)
+    except ArtoError as e:
+        yield from failed([name], e, share, batch)
+        return None
 
 
 def run(steps: Steps[_Made], say: Callable[[Progress | Render], None] | None = None) -> _Made:

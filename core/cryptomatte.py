@@ -11,14 +11,15 @@ Examples
 >>> path = Path(folder.name) / "render.exr"
 >>> about = {"cryptomatte/a1b2c3d/name": "CryptoObject"}
 >>> exr.write_planes(path, {"CryptoObject00": {"R": np.zeros((2, 3))}}, about)
->>> planes, found = read(path)
->>> list(planes), found == about
-(['CryptoObject00.R'], True)
+>>> found = read(path)
+>>> list(found.planes), found.about == about, found.frame
+(['CryptoObject00.R'], True, None)
 >>> folder.cleanup()
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,29 @@ from .errors import ExrError
 _KEY = "cryptomatte/"
 
 
-def read(path: Path) -> tuple[dict[str, NDArray], dict[str, Any]]:
+@dataclass(frozen=True)
+class Mattes:
+    """The Cryptomattes of a render.
+
+    Parameters
+    ----------
+    planes : dict of str to (H, W) float32
+        The planes of all ranks by the full names of their channels.
+    about : dict
+        The attributes of the header that describe them.
+    frame : int or None
+        The frame of the render; None where the header does not say.
+    camera : str
+        The name of its camera; empty where the header does not say.
+    """
+
+    planes: dict[str, NDArray]
+    about: dict[str, Any]
+    frame: int | None = None
+    camera: str = ""
+
+
+def read(path: Path) -> Mattes:
     """Read the Cryptomattes of an EXR file.
 
     Parameters
@@ -39,10 +62,7 @@ def read(path: Path) -> tuple[dict[str, NDArray], dict[str, Any]]:
 
     Returns
     -------
-    planes : dict of str to (H, W) float32
-        The planes of all ranks by the full names of their channels.
-    about : dict
-        The attributes of the header that describe them.
+    Mattes
 
     Raises
     ------
@@ -67,4 +87,15 @@ def read(path: Path) -> tuple[dict[str, NDArray], dict[str, Any]]:
         raise ExrError(
             f"{path} has no Cryptomatte: turn it on in the view layer's passes, and render again"
         )
-    return planes, about
+    heads = [head for head, _ in parts]
+    return Mattes(planes, about, _frame(heads), _said(heads, "Camera"))
+
+
+def _said(heads: list[dict[str, Any]], name: str) -> str:
+    """What a file says of its render, as Blender names it; empty where it says nothing."""
+    return next((str(head[name]) for head in heads if head.get(name)), "")
+
+
+def _frame(heads: list[dict[str, Any]]) -> int | None:
+    text = _said(heads, "Frame").strip()
+    return int(text) if text.removeprefix("-").isdecimal() and len(text) < 12 else None

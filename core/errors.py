@@ -62,5 +62,9 @@ class FilesError(ArtoError):
     """A file or folder that is not ARTO's to change or remove, or that cannot be written."""
 
 
+class StrictError(ArtoError):
+    """A warning that counts as an error, because the caller asked for that."""
+
+
 class FarmError(ArtoError):
     """A farm's job that is incomplete or damaged, or that was made for another scene."""

@@ -25,7 +25,7 @@ from ..shot import paths
 from ..shot.shot import shot_of
 from ..stage import takes
 from ..stage.stage import Stage, set_region
-from ..work import Progress, Render, Steps
+from ..work import Progress, Render, Steps, Warned, Wrote
 from . import beside, planes
 from .asked import Asked, asked, begun
 from .check import check_scene
@@ -104,6 +104,8 @@ def _capture(
         folder = paths.unfinished_folder(claimed, this.key)
         head = unfinished(folder, this.key)
         stopped = head is not None
+        if head and head.caution:
+            yield Warned(0.0, f"CAUTION: {head.caution.text}")
         if head is None:
             _, head = yield from _begun(this, folder, given)
             empty(folder)
@@ -122,7 +124,8 @@ def _capture(
             empty_take(claimed / name)
     paths.forget()
     caution = f". CAUTION: {head.caution.text}" if head.caution else ""
-    yield Progress(1.0, f"captured {len(head.hemicube)} patches{caution}")
+    text = f"captured {len(head.hemicube)} patches{caution}"
+    yield Wrote(1.0, text, claimed / "capture")
     return claimed / "capture"
 
 

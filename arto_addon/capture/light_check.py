@@ -21,7 +21,7 @@ from ...core.patterns import pattern_set
 from ..blender.nodes import shader_tree, trees
 from ..stage.small import parts_of, small
 from ..stage.stage import Stage
-from ..work import Progress, Steps
+from ..work import Steps, Warned
 from ..world.lamp_render import world_showing
 from . import planes
 
@@ -71,7 +71,7 @@ def check_light(on: Stage, hemicube: Hemicube) -> Steps[tuple[bool, Caution | No
     text = text or _words(on, seen)
     if not text:
         return False, None
-    yield Progress(0.0, f"CAUTION: {text}")
+    yield Warned(0.0, f"CAUTION: {text}")
     return sampled, Caution(text, seen.ratio, seen.worst, seen.share, seen.dark)
 
 

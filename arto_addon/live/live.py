@@ -210,7 +210,7 @@ class Live:
         try:
             path = relit_file(scene)
             world = check_world(scene, self.layer)
-            same = exr.header(path).get(HEADER) == light_key(scene, world)
+            same = exr.header(path).get(HEADER) == light_key(scene, world, self.layer)
             return same and path.stat().st_mtime_ns >= self.written
         except (ArtoError, OSError):
             return False

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import math
-import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +22,7 @@ from ...core.exr.window import Box
 from ..blender.compositing import choose, compositor, darkroom, turned_off
 from ..blender.pictures import put
 from ..stage.stage import picture_size
+from . import footage_file
 
 # How footage of another shape fills the frame: the compositor's name by the camera's name.
 _FILLS = {"STRETCH": "Stretch", "FIT": "Fit", "CROP": "Crop"}
@@ -51,9 +51,11 @@ class Footage:
     def read(self, scene: bpy.types.Scene) -> NDArray[np.float32]:
         """Read the footage at the scene's frame -> (H, W, 3), scene-linear, the picture's size.
 
-        The footage counts as opaque, whatever alpha the file has. Raises SceneError where Blender
-        cannot read the footage, or where pixels are not finite.
+        The footage counts as opaque, whatever alpha the file has. Raises SceneError where the file
+        of the frame is missing, damaged or of another size than the sequence, where Blender cannot
+        read the footage, or where pixels are not finite.
         """
+        self.check(scene)
         data, display = self._windows(scene)
         frame = _with_overscan(scene, display)
         if not data == display == frame:
@@ -125,33 +127,29 @@ class Footage:
 
         Blender shows only the data window of an EXR, wherever it stands in the display window.
         """
-        file = self._file(scene)
+        file = self.file(scene)
         if file is not None and file.suffix.lower() == ".exr" and file.is_file():
             return exr.windows(file)
         width, height = _pixels(self.source, file)
         data = 0, 0, width - 1, height - 1
         return data, data
 
-    def _file(self, scene: bpy.types.Scene) -> Path | None:
+    def file(self, scene: bpy.types.Scene) -> Path | None:
         """The file that is shown at the scene's frame; None where the source is not such a file."""
-        source = self.source
-        if source.source not in {"FILE", "SEQUENCE"} or getattr(source, "packed_file", None):
-            return None
-        path = Path(bpy.path.abspath(source.filepath, library=source.library))
-        digits = re.search(r"(\d+)(?=\D*$)", path.stem)
-        if source.source == "FILE" or not digits:
-            return path
-        if isinstance(source, bpy.types.MovieClip):
-            number = int(digits[1]) + scene.frame_current - source.frame_start + source.frame_offset
-        elif self.timing is None:
-            number = scene.frame_current
-        else:
-            number = scene.frame_current - self.timing.frame_start + 1 + self.timing.frame_offset
-        text = f"{max(number, 0):0{len(digits[1])}d}"
-        now = path.with_name(
-            path.stem[: digits.start()] + text + path.stem[digits.end() :] + path.suffix
-        )
-        return now if now.is_file() else path
+        return footage_file.file_at(self.source, self.timing, scene.frame_current)
+
+    def shown(self, scene: bpy.types.Scene) -> str:
+        """The name of what is shown at the scene's frame: its file's, or the image's or clip's."""
+        file = self.file(scene)
+        return file.name if file else self.name
+
+    def check(self, scene: bpy.types.Scene) -> str:
+        """Look at the footage of the scene's frame without reading it into a picture.
+
+        Returns a warning in words, or "". Raises SceneError where the file of the frame is missing
+        or damaged, or is of another size than the sequence.
+        """
+        return footage_file.check(self.source, self.timing, scene.frame_current)
 
     def _placed(self, scene: bpy.types.Scene, data: Box, display: Box) -> NDArray[np.float32]:
         """Read footage whose data window is not its frame; black where the frame has no pixels."""
@@ -180,7 +178,7 @@ class Footage:
         An EXR is read as an image, because Blender's compositor (5.2) shifts a data window that is
         not in the middle of its display window.
         """
-        file = self._file(scene)
+        file = self.file(scene)
         if file is None or file.suffix.lower() != ".exr":
             return self._composited(scene, size, opaque=True)
         image = bpy.data.images.load(str(file))
@@ -214,10 +212,8 @@ class Footage:
     def missing(self) -> str:
         """The path of the footage's file where the file is missing; else empty."""
         image = self.source
-        if isinstance(image, bpy.types.Image) and (
-            image.source not in {"FILE", "MOVIE"} or image.packed_file
-        ):
-            return ""
+        if image.source not in {"FILE", "MOVIE"} or getattr(image, "packed_file", None):
+            return ""  # `check` looks at the files of a sequence, frame by frame.
         path = Path(bpy.path.abspath(image.filepath, library=image.library))
         return "" if path.exists() else str(path)
 

@@ -41,9 +41,12 @@ def relit_name(scene: bpy.types.Scene, look: str | None = None) -> str:
     return name
 
 
-def _of_look(look: str) -> str:
-    """The part of a file's name that stands for a look. Where a look is named like an ending, such
-    as `layers`, the part gets a digest, so that no plate is written over another's layers."""
+def of_look(look: str) -> str:
+    """The part of a file's name that stands for a look or a world.
+
+    Where it is named like an ending, such as `layers`, the part gets a digest, so that no plate is
+    written over another's layers.
+    """
     name = safe_name(look)
     return f"{name}~{short_hash(look)}" if _BESIDE.search(name) else name
 
@@ -55,14 +58,33 @@ def _numbered(stem: str, frame: int) -> tuple[re.Match[str] | None, str]:
     return (mark, f"{mark[1]}{frame:0{len(mark[2])}d}") if mark else (None, "")
 
 
+def has_number(path: Path) -> bool:
+    """Whether a file's name has hashes, which stand for a frame's number."""
+    return bool(_HASHES.search(path.stem))
+
+
+def at_frame(path: Path, frame: int) -> Path:
+    """The path with a frame's number in place of the hashes in its name."""
+    mark, number = _numbered(path.stem, frame)
+    if mark is None:
+        return path
+    return path.with_name(
+        path.stem[: mark.start()] + number + path.stem[mark.end() :] + path.suffix
+    )
+
+
 def numbers_frames(scene: bpy.types.Scene) -> bool:
     """Whether the name of the output has a place for the frame's number."""
-    return bool(scene.arto.output) and bool(_HASHES.search(Path(scene.arto.output).stem))
+    return bool(scene.arto.output) and has_number(Path(scene.arto.output))
 
 
-def relit_file(scene: bpy.types.Scene, look: str | None = None) -> Path:
-    """The path of a plate's EXR. look: the plate's (default: the scene's look now). Raises
-    SceneError where the path depends on a .blend that was never saved."""
+def relit_file(scene: bpy.types.Scene, look: str | None = None, frame: int | None = None) -> Path:
+    """The path of a plate's EXR.
+
+    look, frame: the plate's (default: the scene's now). Raises SceneError where the path depends on
+    a .blend that was never saved.
+    """
+    at: int = scene.frame_current if frame is None else frame
     look = scene.arto.look.strip() if look is None else look
     name = relit_name(scene, look)
     mark = f"~{name.rpartition('~')[2]}" if "~" in name else ""
@@ -76,9 +98,9 @@ def relit_file(scene: bpy.types.Scene, look: str | None = None) -> Path:
             path = path.with_name(path.name + ".exr")
         # A copied scene has the output of its original, so the scene's name tells them apart.
         shared = any(s.arto.output == scene.arto.output for s in bpy.data.scenes if s != scene)
-        parts = [*([safe_name(scene.name)] if shared else []), *([_of_look(look)] if look else [])]
+        parts = [*([safe_name(scene.name)] if shared else []), *([of_look(look)] if look else [])]
         # Hashes stand for the frame's number, which stays last in the name.
-        stem, mark, number = path.stem, *_numbered(path.stem, scene.frame_current)
+        stem, mark, number = path.stem, *_numbered(path.stem, at)
         if mark:
             stem = stem[: mark.start()] + "".join(f"_{part}" for part in parts) + number
             return path.with_name(stem + path.stem[mark.end() :] + ".exr")
@@ -89,5 +111,5 @@ def relit_file(scene: bpy.types.Scene, look: str | None = None) -> Path:
             "set ARTO's output to an absolute path"
         )
     blend = Path(home.file())
-    parts = [safe_name(scene.name), _of_look(look or _PLAIN)] if name else [_PLAIN]
+    parts = [safe_name(scene.name), of_look(look or _PLAIN)] if name else [_PLAIN]
     return blend.with_name("_".join([blend.stem, *parts]) + mark + ".exr")

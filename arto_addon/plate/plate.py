@@ -10,13 +10,15 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core import cryptomatte, exr
-from ...core.errors import FieldError, SceneError
+from ...core import exr
+from ...core.cryptomatte import Mattes
+from ...core.errors import FieldError
 from ...core.exr.window import NO_HIT, Window
+from ...core.exr.writing import Opener
 from ...core.field.field import Field
+from ...core.files import whole
 from ..blender.colour import working_space
 from ..blender.compositing import mixed
-from ..shot import home
 from .header import header
 from .names import relit_name
 
@@ -36,19 +38,22 @@ def write(
     picture: NDArray[np.float32],
     about: dict[str, str],
     shows: bool = False,
+    opener: Opener = whole,
 ) -> None:
     """Write a picture of a plate.
 
     The header names the colour space, and has the attributes of Blender's own render of the scene.
     picture: (H, W, 4), scene-linear, premultiplied; about: more attributes, by the names after
     `arto.`; shows: whether a node group of ARTO's shows the file. A cropped file then gets a copy
-    with all pixels.
+    with all pixels, which its header names. opener: how the files are put in their places.
     """
     window = window_of(scene)
-    exr.write(path, {"": picture}, *header_of(scene, about), window)
+    attributes, space = header_of(scene, about)
+    named = attributes | ({CROPPED: full_file(path).name} if window.crop and shows else {})
+    exr.write(path, {"": picture}, named, space, window, opener=opener)
     if window.crop and shows:
         full = replace(window, crop=False)
-        exr.write(full_file(path), {"": picture}, *header_of(scene, about), full)
+        exr.write(full_file(path), {"": picture}, attributes, space, full, opener=opener)
 
 
 def window_of(scene: bpy.types.Scene) -> Window:
@@ -95,6 +100,15 @@ def layers_file(path: Path) -> Path:
     return path.with_name(f"{path.stem}_layers.exr")
 
 
+def layers_prefix(path: Path, said: str) -> str | None:
+    """The prefix of the files of single layers beside a plate, from what the plate's header says.
+
+    said: the header's `LAYERS`, as in `shot_relit_LG_*.exr`. None where it names no such files.
+    """
+    begin, end = f"{path.stem}_", "*.exr"
+    return said[len(begin) : -len(end)] if said.startswith(begin) and said.endswith(end) else None
+
+
 def world_file(path: Path) -> Path:
     """The path of the world of a mix, beside a plate: renders of the scene get the mix's light."""
     return path.with_name(f"{path.stem}_world.exr")
@@ -114,13 +128,17 @@ MISSING = "arto.missing"
 
 
 def write_data(
-    scene: bpy.types.Scene, path: Path, field: Field, about: dict[str, str]
+    scene: bpy.types.Scene,
+    path: Path,
+    field: Field,
+    mattes: Mattes | None,
+    about: dict[str, str],
+    opener: Opener = whole,
 ) -> list[str]:
     """Write a plate's data file: the data layers of a field, and the artist's Cryptomattes.
 
-    Each layer is a part of 32-bit floats. The Cryptomattes come from the artist's own render, where
-    the settings name one. Returns the names of the layers that the field does not have. Raises
-    SceneError where the render has another size; ExrError.
+    Each layer is a part of 32-bit floats. mattes: from the artist's own render, see `mattes.read`.
+    Returns the names of the layers that the field does not have. Raises ExrError.
     """
     parts: dict[str, dict[str, NDArray]] = {}
     missing = [name for name in DATA if not field.has_layer(name)]
@@ -138,15 +156,12 @@ def write_data(
     attributes, _ = header_of(scene, about)
     if missing:
         attributes[MISSING] = ", ".join(missing)
-    if scene.arto.cryptomatte:
-        rendered = home.absolute(scene.arto.cryptomatte)
-        planes, names = cryptomatte.read(rendered)
-        if any(plane.shape != field.shape for plane in planes.values()):
-            raise SceneError(f"{rendered} is a render of another size: render this shot again")
-        parts[MATTES] = planes
-        attributes |= names
+    if mattes:
+        parts[MATTES] = mattes.planes
+        attributes |= mattes.about
     if parts:
-        exr.write_planes(data_file(path), parts, attributes, window_of(scene), [MATTES])
+        window = window_of(scene)
+        exr.write_planes(data_file(path), parts, attributes, window, [MATTES], opener)
     return missing
 
 

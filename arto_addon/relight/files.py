@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.catcher import Caught
+from ...core.exr.writing import Opener
 from ..plate import plate
-from ..work import Progress, Steps
+from ..plate.together import PLATE, Together
+from ..work import Progress, Steps, Warned, Wrote
 from . import layers
 from .shown import Ready, Shown
 
@@ -32,16 +34,18 @@ class Made:
 def write(shown: Shown, ready: Ready, made: Made, about: dict[str, str]) -> Steps[None]:
     """Write the plate and the files that the settings ask for beside it.
 
-    about: the first entries of each header. Raises SceneError, ExrError.
+    All are put in place together once they are complete. Files that ARTO has written beside an
+    earlier plate, and that this one does not have, are removed. about: the first entries of each
+    header. Raises SceneError, ExrError.
     """
-    scene, path, picture, caught = shown.scene, ready.lit.path, made.picture, made.caught
+    scene, path, caught = shown.scene, ready.lit.path, made.caught
     settings = scene.arto
     yield Progress(0.9, f"writing {path}")
     about = about | {"lamps": ready.lamps}
     if scene.render.film_transparent and scene.cycles.film_transparent_glass:
         glass = "opaque: what is seen through it is in it, whatever Transparent Glass says"
         about["glass"] = glass
-        yield Progress(0.9, f"glass: {glass}")
+        yield Warned(0.9, f"glass: {glass}")
     about |= {
         "look": ready.lit.look,
         "turn": f"{math.degrees(ready.whole.turn):.4g}" if ready.whole.turn else "",
@@ -57,26 +61,47 @@ def write(shown: Shown, ready: Ready, made: Made, about: dict[str, str]) -> Step
         if settings.layers_files == "EACH":
             name = f"{path.stem}_{layers.prefix_of(scene)}*.exr"
         about[plate.LAYERS.removeprefix("arto.")] = name
-    if plate.window_of(scene).crop:
-        about[plate.CROPPED.removeprefix("arto.")] = plate.full_file(path).name
-    plate.write(scene, path, picture, about, shows=True)
+    about[PLATE.removeprefix("arto.")] = path.name
+    single = settings.layers != "OFF" and settings.layers_files == "EACH"
+    together = Together(path, layers.prefix_of(scene) if single else None)
+    with together:
+        yield from _written(shown, ready, made, about, together.file)
+    for there in sorted(together.written, key=lambda there: there != path):
+        yield Wrote(0.95, f"wrote {there.name}", there)
+    if together.removed:
+        names = ", ".join(there.name for there in together.removed)
+        yield Progress(0.95, f"removed {names}: of the plate before")
+
+
+def _written(
+    shown: Shown, ready: Ready, made: Made, about: dict[str, str], opener: Opener
+) -> Steps:
+    """Write the plate and the files beside it. about: of each header; opener: see `Together`."""
+    scene, path, picture, caught = shown.scene, ready.lit.path, made.picture, made.caught
+    settings = scene.arto
+    plate.write(scene, path, picture, about, shows=True, opener=opener)
     if caught:
-        plate.write(scene, plate.share_file(path), caught.share, about, shows=True)
+        share = plate.share_file(path)
+        plate.write(scene, share, caught.share, about, shows=True, opener=opener)
         if settings.shadows == "ADD":
-            plate.write(scene, plate.light_file(path), caught.light, about)
-        yield from _into_footage(shown, ready, caught, about)
-    if settings.write_data and (missing := plate.write_data(scene, path, shown.field, about)):
-        lacks = f"the data file has no {', '.join(missing)}"
-        yield Progress(0.9, f"{lacks}: it was not captured; capture again to have it")
+            plate.write(scene, plate.light_file(path), caught.light, about, opener=opener)
+        yield from _into_footage(shown, ready, caught, about, opener)
+    if settings.write_data:
+        mattes = shown.mattes()
+        missing = plate.write_data(scene, path, shown.field, mattes, about, opener)
+        if missing:
+            lacks = f"the data file has no {', '.join(missing)}"
+            yield Warned(0.9, f"{lacks}: it was not captured; capture again to have it")
     if settings.layers != "OFF":
         found = yield from layers.of_plate(shown, ready)
         if not scene.render.film_transparent:
             found[layers.BEHIND] = picture[..., :3] - made.things
-        yield from layers.write(scene, path, picture, found, *plate.header_of(scene, about))
+        attributes, space = plate.header_of(scene, about)
+        yield from layers.write(scene, path, picture, found, attributes, space, opener)
 
 
 def _into_footage(
-    shown: Shown, ready: Ready, caught: Caught, about: dict[str, str]
+    shown: Shown, ready: Ready, caught: Caught, about: dict[str, str], opener: Opener
 ) -> Iterator[Progress]:
     """Write the picture of the things over the artist's footage, where the scene has footage."""
     found = shown.filmed()
@@ -87,4 +112,4 @@ def _into_footage(
     adds = shown.scene.arto.shadows == "ADD"
     comp = caught.added_to(there) if adds else caught.over(there)
     path = plate.comp_file(ready.lit.path)
-    plate.write(shown.scene, path, comp, about | {"footage": name})
+    plate.write(shown.scene, path, comp, about | {"footage": name}, opener=opener)

@@ -17,8 +17,11 @@ from numpy.typing import NDArray
 
 from ...core import exr
 from ...core.errors import SceneError
+from ...core.exr.writing import Opener
+from ...core.faces import FACE_NAMES
 from ...core.field.field import Field
 from ...core.file_names import safe_name
+from ...core.files import whole
 from ...core.light.environment import Environment
 from ...core.light.layers import REST, by_faces, disc, part_of, residual, share_out, shares
 from ...core.light.light import PatchLight
@@ -26,17 +29,17 @@ from ...core.relight import relights, together
 from ..blender import denoise
 from ..plate.names import relit_file
 from ..plate.plate import (
+    CROPPED,
     comp_file,
     data_file,
     full_file,
     layers_file,
     light_file,
     share_file,
-    shown_file,
     window_of,
     world_file,
 )
-from ..work import Progress, Steps
+from ..work import Progress, Steps, Warned
 from ..world import kept
 from ..world.lamp_render import lamp_light, lamp_samples
 from ..world.own import gains_of
@@ -50,6 +53,24 @@ SOCKETS = {"Exposure", "Footage", "Image", "Combined", "Alpha"}
 LEAST_LAMPS = 1e-4
 # The largest number that a half float holds.
 HALF = 65504.0
+
+
+def check(scene: bpy.types.Scene, path: Path, field: Field) -> None:
+    """Check that the layers of a plate can be named, before anything is made.
+
+    Raises SceneError where two layers share a name, where a layer is named as a mixer's socket, or
+    where its file would be written over another.
+    """
+    settings = scene.arto
+    if settings.layers == "OFF":
+        return
+    if settings.layers == "GROUPS":
+        _check(scene)
+    if settings.layers_files == "EACH":
+        groups = [group.name for group in settings.groups]
+        parts = [*groups, REST] if settings.layers == "GROUPS" else list(FACE_NAMES)
+        own = field.own_layers if settings.own_lamps else []
+        layer_files(path, [channel_name(scene, name) for name in (*parts, *own, OWN, BEHIND)])
 
 
 def _check(scene: bpy.types.Scene) -> None:
@@ -156,11 +177,12 @@ def write(
     layers: dict[str, NDArray[np.float32]],
     attributes: dict[str, object],
     space: str,
+    opener: Opener = whole,
 ) -> Steps[None]:
     """Write the layers of a plate: all with the plate in one file, or each in a file of its own.
 
-    beauty: the plate, (H, W, 4). The last message says by how much the sum of the layers differs
-    from the plate. Raises SceneError, ExrError.
+    beauty: the plate, (H, W, 4); opener: how the files are put in their places. The last message
+    says by how much the sum of the layers differs from the plate. Raises SceneError, ExrError.
     """
     settings = scene.arto
     names = [channel_name(scene, name) for name in layers]
@@ -172,7 +194,7 @@ def write(
         if max(float(np.max(p, initial=0)) for p in [*parts, beauty]) <= HALF:
             kind = np.float16
         else:
-            yield Progress(0.95, "the layers are written as 32-bit: light past what half holds")
+            yield Warned(0.95, "the layers are written as 32-bit: light past what half holds")
     stored = [part.astype(kind) for part in parts]
     picture = beauty.astype(kind)
     off = residual(stored, picture[..., :3].astype(np.float64))
@@ -180,15 +202,17 @@ def write(
     window = window_of(scene)
     for name, file in files.items():
         one = np.dstack([named[name], picture[..., 3]])
-        exr.write(file, {"": one}, attributes | {"arto.layer": name}, space, window)
+        said = attributes | {"arto.layer": name}
+        exr.write(file, {"": one}, said, space, window, opener=opener)
     together = layers_file(path)
+    shown = full_file(together) if window.crop else together
     if not each:
-        exr.write_layered(together, picture, named, attributes, space, window)
+        said = attributes | ({CROPPED: shown.name} if window.crop else {})
+        exr.write_layered(together, picture, named, said, space, window, opener)
     # the mixer reads all layers and all their pixels from one file
-    whole = shown_file(together, attributes)
     if window.crop if not each else path == relit_file(scene):
         full = replace(window, crop=False)
-        exr.write_layered(whole, picture, named, attributes, space, full)
+        exr.write_layered(shown, picture, named, attributes, space, full, opener)
     yield Progress(0.95, f"layers: {', '.join(named)}; their sum is off by {off:.1e} at most")
 
 

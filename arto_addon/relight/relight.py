@@ -21,13 +21,13 @@ from ..plate import plate
 from ..plate.names import relit_file
 from ..plate.present import present
 from ..shot.shot import check_same_shot, layer_of
-from ..work import Progress, Steps
+from ..work import Progress, Steps, Warned
 from ..world import kept
 from ..world.background import background, background_with_holes, holds_out, without_holes
 from ..world.check import check_world, differs_by_rays
 from ..world.lamp_render import brightness, lamp_light, lamp_samples
 from ..world.own import own_of
-from . import files, light_key
+from . import ahead, files, light_key
 from .shown import Laps, Light, Ready, Shown
 
 # From this share of the light on, the lamps' picture and the field's are denoised as a single sum.
@@ -95,18 +95,21 @@ def make_ready(shown: Shown, lit: Light) -> Steps[Ready]:
     changed = shown.changed()
     if changed:
         # a warning, not an error: only the artist knows whether the change shows
-        yield Progress(0.0, f"the scene is not the captured one: {'; '.join(changed[:3])}")
+        yield Warned(0.0, f"the scene is not the captured one: {'; '.join(changed[:3])}")
+    if by_rays := differs_by_rays(world):
+        yield Warned(0.0, f"the world is {by_rays}")
     # raise before the long work what would be raised after it
     plate.window_of(scene).check(field.shape)
-    shown.filmed()
+    ahead.check_picture(shown, lit.path, lit.world)
+    shown.mattes()
+    if shown.filmed() and (said := shown.footage_warning()):
+        yield Warned(0.0, said)
     yield Progress(0.0, "bringing the world to an environment map")
-    if by_rays := differs_by_rays(world):
-        yield Progress(0.0, f"the world is {by_rays}")
     whole = kept.environment(scene, settings.environment_width, layer, lit.world)
     below = ""
     if whole.below_zero > LEAST_SHARE:
         below = f"{whole.below_zero:.1%} of its light is below 0"
-        yield Progress(0.0, f"the world is no light: {below}, which no layer and no shadow has")
+        yield Warned(0.0, f"the world is no light: {below}, which no layer and no shadow has")
     laps.lap("world")
     found = shown.split(whole)
     parts, lamps, together = yield from _lamps(shown, found)
@@ -156,7 +159,7 @@ def finish(
         else:
             # three places say this: this message, the file's header and the last message
             denoised = "no: this Blender was built without Open Image Denoise"
-            yield Progress(0.7, f"denoising: {denoised}")
+            yield Warned(0.7, f"denoising: {denoised}")
         lap("denoise")
     for picture, parts in zip(pictures, summed, strict=True):
         picture[..., :3] = sum(parts)
@@ -177,7 +180,8 @@ def finish(
         check_finite(picture, f"the world '{ready.world.name}' behind the scene")
     check_finite(picture, "the sum of the picture's parts")
     about = {"scene": scene.name, "world": ready.world.name, "denoised": denoised}
-    about[light_key.HEADER.removeprefix("arto.")] = light_key.light_key(scene, ready.world)
+    key = light_key.light_key(scene, ready.world, shown.layer, shown.field)
+    about[light_key.HEADER.removeprefix("arto.")] = key
     yield from files.write(shown, ready, files.Made(picture, things, caught), about)
     lap("write")
     say = f" (denoised: {denoised})" if settings.denoise else ""
@@ -233,6 +237,8 @@ def _lamps(shown: Shown, found: Split) -> Steps[tuple[list[NDArray[np.float32]],
         lamps = "no: lamps at infinity would not stand where a near hemicube has them"
     elif about.view_layer is None:
         lamps = "no: the field does not say of which view layer it is; capture again"
+        yield Warned(0.3, f"the world's lamps: {lamps}")
+        return [], lamps, False
     else:
         samples = lamp_samples(shown.scene, found.share)
         lamps = f"{found.share:.0%} of the world's light, {samples} samples"

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ...core.capture.kinds import Route
 from ...core.catcher import held_out
+from ...core.cryptomatte import Mattes
 from ...core.errors import FieldError
 from ...core.field.field import Field
 from ...core.light.environment import Environment
@@ -22,6 +23,7 @@ from ...core.light.light import PatchLight
 from ...core.relight import relights
 from ..blender import denoise
 from ..fit import guides
+from ..plate import mattes
 from ..plate.footage import footage
 from ..shot import paths
 from ..shot.shot import check_same_shot
@@ -78,6 +80,7 @@ class Shown:
         self._changed: dict[tuple[int, float], list[str]] = {}
         self._split: tuple[NDArray[np.float32], Split] | None = None
         self._filmed: tuple[tuple[int, float], tuple[str, NDArray[np.float32]]] | None = None
+        self._mattes: tuple[Path | None, Mattes | None] | None = None
         self.held = self.field.about.route == Route.SAMPLED
         self._others: list[Shown] = []
         if self.field.about.catchers and not self.field.about.take:
@@ -127,8 +130,23 @@ class Shown:
             return None
         key = self.scene.frame_current, self.scene.frame_subframe
         if self._filmed is None or self._filmed[0] != key:
-            self._filmed = key, (found.name, found.read(self.scene))
+            self._filmed = key, (found.shown(self.scene), found.read(self.scene))
         return self._filmed[1]
+
+    def footage_warning(self) -> str:
+        """What to warn of in the footage at this frame, in words; "" for nothing."""
+        found = footage(self.scene) if len(self.takes) > 1 else None
+        return found.check(self.scene) if found else ""
+
+    def mattes(self) -> Mattes | None:
+        """The artist's Cryptomattes of this shot; None where the settings ask for none.
+
+        They are read once for all lights of a frame. Raises SceneError, ExrError.
+        """
+        path = mattes.file_of(self.scene, self.field)
+        if self._mattes is None or self._mattes[0] != path:
+            self._mattes = path, mattes.read(self.scene, self.field)
+        return self._mattes[1]
 
     def split(self, whole: Environment) -> Split:
         """Cut the lamps out of a light.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from .setting import Decides, Setting
 
 # Settings of the light. The order is also the order of the command line's options, and of the
-# values in the key of a plate's light.
+# values in the key of a plate.
 LIGHT = (
     Setting(
         name="own_lamps",
@@ -133,7 +133,7 @@ FILES = (
         words="What the layers' names begin with in the file",
         default="LG_",
         work="relight",
-        decides=Decides.NOTHING,
+        decides=Decides.PLATE,
         farm=False,
         option=True,
         panels=("Layers",),
@@ -154,7 +154,7 @@ FILES = (
         ),
         default="ONE",
         work="relight",
-        decides=Decides.NOTHING,
+        decides=Decides.PLATE,
         farm=False,
         option=True,
         panels=("Layers",),
@@ -166,7 +166,7 @@ FILES = (
         words="Write the layers as 16-bit floats, as compositing does; else as 32-bit",
         default=True,
         work="relight",
-        decides=Decides.NOTHING,
+        decides=Decides.PLATE,
         farm=False,
         option=True,
         panels=("Layers",),
@@ -178,7 +178,7 @@ FILES = (
         words="Write albedo, normals, depth and positions beside the picture, as 32-bit floats",
         default=False,
         work="relight",
-        decides=Decides.NOTHING,
+        decides=Decides.PLATE,
         farm=False,
         option=True,
         panels=("Layers",),
@@ -192,7 +192,7 @@ FILES = (
         subtype="FILE_PATH",
         default="",
         work="relight",
-        decides=Decides.NOTHING,
+        decides=Decides.PLATE,
         farm=False,
         option=True,
         panels=("Layers",),
@@ -213,7 +213,7 @@ FILES = (
         ),
         default="MULTIPLY",
         work="relight",
-        decides=Decides.NOTHING,
+        decides=Decides.PLATE,
         farm=False,
         option=True,
         panels=("Layers",),
@@ -234,7 +234,7 @@ FILES = (
         ),
         default="FULL",
         work="relight",
-        decides=Decides.NOTHING,
+        decides=Decides.PLATE,
         farm=False,
         option=True,
         panels=("Layers",),
@@ -250,7 +250,7 @@ FILES = (
         soft_most=500,
         default=0,
         work="relight",
-        decides=Decides.NOTHING,
+        decides=Decides.PLATE,
         farm=False,
         option=True,
         panels=("Layers",),

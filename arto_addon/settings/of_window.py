@@ -65,7 +65,7 @@ SHOWN = (
         words="What the things are put into where the scene has shadow catchers: an image, "
         "a sequence or a movie. Empty: what the camera has behind it, or the compositor",
         work="relight",
-        decides=Decides.NOTHING,
+        decides=Decides.PLATE_MADE,
         farm=False,
         option=False,
         panels=("Layers",),
@@ -127,7 +127,7 @@ SHOWN = (
         name="groups",
         kind="list",
         work="relight",
-        decides=Decides.NOTHING,
+        decides=Decides.PLATE_MADE,
         farm=False,
         option=False,
         panels=("Layers",),

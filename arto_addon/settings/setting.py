@@ -41,9 +41,10 @@ class Decides(Enum):
     # The value counts unless `keep` is "always": a field cannot be fitted again without its basis
     # images, so another fit needs another capture.
     CAPTURE_FIT = "capture, by its fit"
-    # The key of a plate's light has the value itself.
+    # The key of a plate has the value itself.
     PLATE = "plate"
-    # The key of a plate's light has what is made of the value: the gains of lamps.
+    # The key of a plate has what is made of the value: the gains of lamps, the places of groups,
+    # the file of the footage.
     PLATE_MADE = "plate, by what is made of it"
 
     @property

@@ -65,7 +65,7 @@ def _plate_line(scene: bpy.types.Scene) -> tuple[str, bool]:
     if field.is_file() and field.stat().st_mtime > written:
         return tr("{plate}, of an earlier capture", plate=text), False
     if world is None or header.get(HEADER) != light_key(scene, world):
-        return tr("{plate}, the light changed since", plate=text), False
+        return tr("{plate}, light or settings changed since", plate=text), False
     return tr("{plate}, up to date", plate=text), True
 
 

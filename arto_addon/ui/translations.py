@@ -100,7 +100,7 @@ Perhaps {time}, {samples} samples | Vielleicht {time}, {samples} Samples | お�
 {samples} samples a pixel | {samples} Samples je Pixel | {samples} サンプル/ピクセル
 Look '{look}', {time} | Stimmung „{look}“, {time} | ルック「{look}」{time}
 {plate}, up to date | {plate}, aktuell | {plate}、最新
-{plate}, the light changed since | {plate}, Licht seither geändert | {plate}、光が変わりました
+{plate}, light or settings changed since | {plate}, Licht oder Einstellungen seither geändert | {plate}、光か設定が変わりました
 {plate}, of an earlier capture | {plate}, von früherer Aufnahme | {plate}、以前のキャプチャ
 """
 

@@ -27,7 +27,8 @@ def check_world(scene: bpy.types.Scene, view_layer: str | None = None) -> bpy.ty
     """The world of a view layer, checked.
 
     Raises SceneError where there is no world, where the layer leaves the world out, where the world
-    has a volume, or where an image of the world is missing.
+    has a volume, or where an image of the world is missing; of a sequence, the picture of the
+    scene's frame.
     """
     world = world_of(scene, view_layer)
     if world is None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import bpy
 
+from ..blender import sequences
 from ..blender.reached import reached
 
 # Nodes that show an image, and of them those that a frame moves on.
@@ -30,12 +30,7 @@ def number_at(user: bpy.types.ImageUser, frame: int) -> int:
     Before its first image a sequence shows the one before it, and after the last it stays, unless
     it begins anew.
     """
-    length = user.frame_duration
-    if length == 0:
-        return 0
-    at = frame - user.frame_start + 1
-    at = (at % length or length) if user.use_cyclic else min(max(at, 0), length)
-    return at + user.frame_offset
+    return sequences.shown_at(user, frame).number
 
 
 def files_at(node: bpy.types.Node, frame: int) -> list[Path]:
@@ -45,20 +40,10 @@ def files_at(node: bpy.types.Node, frame: int) -> list[Path]:
         return []
     path = Path(bpy.path.abspath(image.filepath, library=image.library))
     if image.source == "SEQUENCE":
-        return [_numbered(path, number_at(node.image_user, frame))]
+        return [sequences.file_of(path, number_at(node.image_user, frame))]
     if image.source == "TILED":
         return [path.with_name(_of_tile(path.name, tile.number)) for tile in image.tiles]
     return [path]
-
-
-def _numbered(path: Path, number: int) -> Path:
-    """The file of a sequence with a number: the last digits before the ending are the number."""
-    found = list(re.finditer(r"\d+", path.stem))
-    if not found:
-        return path
-    last = found[-1]
-    before, after = path.stem[: last.start()], path.stem[last.end() :]
-    return path.with_name(f"{before}{number:0{len(last[0])}d}{after}{path.suffix}")
 
 
 def _of_tile(name: str, number: int) -> str:

@@ -124,13 +124,16 @@ def _key(scene: bpy.types.Scene, world: bpy.types.World, width: int) -> str:
     return hashlib.sha256(repr(of).encode()).hexdigest()[:16]
 
 
-def shows(scene: bpy.types.Scene, world: bpy.types.World) -> tuple[str, float, float]:
+def shows(
+    scene: bpy.types.Scene, world: bpy.types.World, full: bool = False
+) -> tuple[str, float, float]:
     """Read what a world shows, apart from its strength and turn -> (key, strength, turn).
 
-    Nothing is changed or copied, so this is quick enough for many calls a second.
+    Nothing is changed or copied, so this is quick enough for many calls a second. full: the key
+    has the contents of the world's files, which are read anew when a file is another.
     """
     strength, turn, dials = read(world)
-    of: list[object] = [*sorted(of_blocks([world], without=dials).items())]
+    of: list[object] = [*sorted(of_blocks([world], full=full, without=dials).items())]
     of += [of_textures(scene), *context(scene, layer_of(scene), world)]
     if moves(world):
         of += [stamps(world, scene.frame_current), scene.frame_current, scene.frame_subframe]

@@ -17,7 +17,8 @@ Examples
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,8 @@ from .library import openexr
 from .opening import check_complete
 from .window import FULL, Window
 
+# Gives a path to write to, and puts the file in its place when it is complete.
+Opener = Callable[[Path], AbstractContextManager[Path]]
 # What a colour space is called in an EXR header (colorInteropID), by Blender's name for it.
 COLOUR_SPACES = {
     "Linear Rec.709": "lin_rec709_scene",
@@ -46,6 +49,7 @@ def write(
     colour_space: str = "Linear Rec.709",
     window: Window = FULL,
     finite: bool = True,
+    opener: Opener = whole,
 ) -> None:
     """Write layers, each as a part of its own, with ZIP compression.
 
@@ -63,6 +67,8 @@ def write(
     window : Window
     finite : bool
         Whether pixels that are infinite or not a number are refused.
+    opener : Opener, optional
+        How the file is put in its place; by default as soon as it is complete.
 
     Raises
     ------
@@ -73,7 +79,7 @@ def write(
     parts = [(name, _channels(pixels)) for name, pixels in layers.items()]
     if finite:
         _check_finite(path, parts)
-    _write(path, parts, attributes, colour_space, window)
+    _write(path, parts, attributes, colour_space, window, opener)
 
 
 def write_planes(
@@ -82,6 +88,7 @@ def write_planes(
     attributes: dict[str, Any],
     window: Window = FULL,
     handed_on: Collection[str] = (),
+    opener: Opener = whole,
 ) -> None:
     """Write data that is no colour, as planes of 32-bit floats in parts.
 
@@ -95,6 +102,8 @@ def write_planes(
     window : Window
     handed_on : collection of str
         The parts that are another program's, whatever is in them.
+    opener : Opener, optional
+        How the file is put in its place; by default as soon as it is complete.
 
     Raises
     ------
@@ -106,7 +115,7 @@ def write_planes(
         for part, channels in parts.items()
     }
     _check_finite(path, [part for part in planes.items() if part[0] not in handed_on])
-    _write(path, list(planes.items()), attributes, "Non-Color", window)
+    _write(path, list(planes.items()), attributes, "Non-Color", window, opener)
 
 
 def write_layered(
@@ -116,6 +125,7 @@ def write_layered(
     attributes: dict[str, Any] | None = None,
     colour_space: str = "Linear Rec.709",
     window: Window = FULL,
+    opener: Opener = whole,
 ) -> None:
     """Write a picture and layers of it into one part, as compositing programs expect.
 
@@ -132,6 +142,8 @@ def write_layered(
     colour_space : str
         Blender's name of the space of the pixels.
     window : Window
+    opener : Opener, optional
+        How the file is put in its place; by default as soon as it is complete.
 
     Raises
     ------
@@ -142,7 +154,7 @@ def write_layered(
     for name, pixels in layers.items():
         channels |= {f"{name}.{c}": plane for c, plane in _channels(pixels).items()}
     _check_finite(path, [("", channels)])
-    _write(path, [("", channels)], attributes, colour_space, window)
+    _write(path, [("", channels)], attributes, colour_space, window, opener)
 
 
 def _check_finite(path: Path, parts: Iterable[tuple[str, dict[str, NDArray]]]) -> None:
@@ -176,6 +188,7 @@ def _write(
     attributes: dict[str, Any] | None,
     colour_space: str,
     window: Window,
+    opener: Opener,
 ) -> None:
     exr = openexr()
     head = {"compression": exr.ZIP_COMPRESSION, "type": exr.scanlineimage}
@@ -187,7 +200,7 @@ def _write(
         head |= windows
     made = [exr.Part({**head, **(attributes or {})}, channels, name) for name, channels in parts]
     try:
-        with whole(path) as partial:
+        with opener(path) as partial:
             exr.File(made).write(str(partial))
             # the library says nothing when the last bytes find no room
             try:

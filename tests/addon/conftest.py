@@ -9,6 +9,8 @@ from typing import Any
 import arto
 import bpy
 import pytest
+from arto.arto_addon import work
+from arto.arto_addon.capture.capture import capture
 from scene_tools import captured, hdri, small_scene, smooth
 
 
@@ -59,4 +61,17 @@ def lit(tmp_path):
     scene.arto.layers, scene.arto.layers_half = "FACES", False
     hdri(scene, smooth())
     captured(scene)
+    return scene
+
+
+@pytest.fixture(scope="module")
+def shot(tmp_path_factory: pytest.TempPathFactory) -> bpy.types.Scene:
+    """A captured shot of few samples; each test leaves the settings as it found them."""
+    folder = tmp_path_factory.mktemp("shot")
+    scene = small_scene(folder)
+    scene.arto.output = str(folder / "plates" / "shot_relit.exr")
+    scene.arto.samples, scene.arto.patches, scene.arto.adaptive = 4, 1, False
+    scene.arto.keep, scene.arto.denoise, scene.arto.environment_width = "never", False, 64
+    hdri(scene, smooth(16))
+    work.run(capture(scene, scene.view_layers[0].name))
     return scene

@@ -78,7 +78,7 @@ def test_states_of_a_ready_shot(ready) -> None:
 def test_the_light_that_changed_is_told(ready) -> None:
     ready.world.arto.strength = 2.0
     text, good = result_panel.plate_line(ready)
-    assert not good and "the light changed since" in text
+    assert not good and "light or settings changed since" in text
     ready.world.arto.strength = 1.0
     assert result_panel.plate_line(ready)[1]
 

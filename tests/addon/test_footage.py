@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+
 import bpy
 import numpy as np
 import OpenImageIO
@@ -20,6 +22,7 @@ from scene_tools import (
     captured,
     composited,
     in_compositor,
+    small_scene,
 )
 from shot_tools import footage_of, relit_and_share, with_catcher
 
@@ -130,8 +133,104 @@ def test_a_chosen_sequence_shows_the_picture_of_the_frames_number(tmp_path):
         linear = ((round(grey * 255) / 255 + 0.055) / 1.055) ** 2.4
         np.testing.assert_allclose(footage(scene).read(scene), linear, atol=2e-3)
     scene.frame_set(4)
-    with pytest.raises(SceneError, match="at frame 4"):
+    with pytest.raises(SceneError, match=r"of frame 4 .* is not there"):
         footage(scene).read(scene)
+
+
+def sequence(folder, kind):
+    """Three pictures of a ramp, `filmed_0001` to `filmed_0003` -> the path of the first."""
+    for frame in (1, 2, 3):
+        path = folder / f"filmed_{frame:04d}.{kind}"
+        spec = OpenImageIO.ImageSpec(24, 18, 3, "half" if kind == "exr" else "uint8")
+        if kind == "exr":
+            spec.attribute("compression", "piz")
+        file = OpenImageIO.ImageOutput.create(str(path))
+        ramp = np.linspace(0, 1 / frame, 18 * 24 * 3, dtype=np.float32).reshape(18, 24, 3)
+        assert file.open(str(path), spec) and file.write_image(ramp)
+        file.close()
+    return folder / f"filmed_0001.{kind}"
+
+
+def gone(path):
+    path.unlink()
+
+
+def flipped(path):
+    data = bytearray(path.read_bytes())
+    at = len(data) // 2
+    if path.suffix == ".exr":
+        # the only chunk, which its place in the table before it points to: its first bytes are
+        # PIZ's tables, and what PIZ packs has no checksum
+        at = next(i for i in range(len(data)) if data[i : i + 8] == struct.pack("<Q", i + 8)) + 16
+    data[at : at + 40] = b"\xff" * 40
+    path.write_bytes(data)
+
+
+def cut(path):
+    path.write_bytes(path.read_bytes()[:-30])
+
+
+def smaller(path):
+    spec = OpenImageIO.ImageSpec(12, 9, 3, "half" if path.suffix == ".exr" else "uint8")
+    file = OpenImageIO.ImageOutput.create(str(path))
+    assert file.open(str(path), spec) and file.write_image(np.ones((9, 12, 3), np.float32))
+    file.close()
+
+
+def behind_camera(scene, path):
+    camera = scene.camera.data
+    camera.show_background_images = True
+    behind = camera.background_images.new()
+    behind.image = bpy.data.images.load(str(path))
+    behind.image.source = "SEQUENCE"
+    behind.image_user.frame_duration, behind.image_user.frame_start = 3, 1
+
+
+def as_setting(scene, path):
+    scene.arto.footage = bpy.data.images.load(str(path))
+    scene.arto.footage.source = "SEQUENCE"
+
+
+def as_clip(scene, path):
+    scene.camera.data.show_background_images = True
+    behind = scene.camera.data.background_images.new()
+    behind.source, behind.clip = "MOVIE_CLIP", bpy.data.movieclips.load(str(path))
+
+
+@pytest.mark.parametrize("where", [behind_camera, as_setting, as_clip])
+@pytest.mark.parametrize("what", [gone, flipped, cut, smaller])
+@pytest.mark.parametrize("kind", ["exr", "png", "jpg"])
+def test_a_sequence_of_footage_is_looked_at_frame_by_frame(tmp_path, where, what, kind):
+    """A picture that is missing, damaged or of another size is no picture of another frame."""
+    scene = small_scene(tmp_path)
+    path = sequence(tmp_path, kind)
+    where(scene, path)
+    for frame in (1, 2, 3):
+        scene.frame_set(frame)
+        assert footage(scene).check(scene) == ""
+        assert footage(scene).shown(scene) == f"filmed_{frame:04d}.{kind}"
+    if kind == "jpg" and what is flipped:
+        return  # a JPEG has no checksum
+    what(tmp_path / f"filmed_0003.{kind}")
+    scene.frame_set(2)
+    assert footage(scene).check(scene) == ""
+    scene.frame_set(3)
+    for look in (footage(scene).check, footage(scene).read):
+        with pytest.raises(SceneError, match="filmed_0003"):
+            look(scene)
+
+
+def test_footage_that_does_not_last_is_warned_of(tmp_path):
+    """Blender holds the last picture."""
+    scene = small_scene(tmp_path)
+    behind_camera(scene, sequence(tmp_path, "png"))
+    for frame, words in ((3, ""), (4, "does not last until frame 4")):
+        scene.frame_set(frame)
+        assert words in footage(scene).check(scene) and bool(words) == (frame == 4)
+        assert footage(scene).shown(scene) == "filmed_0003.png"
+    scene.camera.data.background_images[0].image_user.use_cyclic = True
+    assert footage(scene).check(scene) == ""
+    assert footage(scene).shown(scene) == "filmed_0001.png"
 
 
 @pytest.mark.parametrize("what", ["truncated", "nan"])
@@ -141,7 +240,7 @@ def test_footage_that_is_no_picture_is_said_before_anything_is_written(tmp_path,
     if what == "truncated":
         path = filmed(tmp_path, 0.5)
         path.write_bytes(path.read_bytes()[:60])
-        match = "shows nothing"
+        match = "damaged or cut off"
     else:
         path, match = tmp_path / "filmed.exr", "1 pixels that are infinite or not a number"
         pixels = np.ones((18, 24, 4), np.float32)

@@ -17,13 +17,13 @@ from arto.arto_addon.capture.resume import empty, empty_take
 from arto.arto_addon.farm import job as farm_job
 from arto.arto_addon.farm.plan import _make_way
 from arto.arto_addon.job import session
-from arto.arto_addon.relight import many
+from arto.arto_addon.relight import ahead
 from arto.arto_addon.relight.relight import check_finite
 from arto.arto_addon.world import kept as maps
-from arto.core import marked
+from arto.core import exr, marked
 from arto.core.capture.head import CaptureHead, write
 from arto.core.capture.tile_entry import TileEntry
-from arto.core.errors import CaptureSetError, FarmError, FieldError, FilesError, SceneError
+from arto.core.errors import FarmError, FieldError, FilesError, SceneError
 from arto.core.hemicube import Hemicube
 from arto.core.patterns import pattern_set
 from arto.core.region import Region
@@ -234,25 +234,41 @@ def test_a_driver_that_was_refused_is_said(tmp_path):
     ],
 )
 def test_a_sequence_with_a_gap_is_refused(monkeypatch, begun, frames, good):
-    monkeypatch.setattr(many.paths, "frames", lambda *_: begun)
-    if good:
-        many._check_frames(bpy.context.scene, "ViewLayer", frames)
-    else:
-        with pytest.raises(CaptureSetError, match="not to the end"):
-            many._check_frames(bpy.context.scene, "ViewLayer", frames)
+    monkeypatch.setattr(ahead.paths, "frames", lambda *_: begun)
+    wrong = ahead.missing_frames(bpy.context.scene, "ViewLayer", frames)
+    assert bool(wrong) != good and wrong.keys() <= set(frames) - {f for f in begun if begun[f]}
+    assert all("not to the end" in str(error) for error in wrong.values())
 
 
 def test_two_worlds_of_one_name_are_refused_before_work(tmp_path):
+    scene = bpy.context.scene
+    scene.arto.output = str(tmp_path / "shot.exr")
     for name in ("a/ok.exr", "b/OK.exr", "b/other.exr"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).touch()
+        exr.write(tmp_path / name, {"": np.ones((2, 4, 3), np.float32)})
     a, b, other = (tmp_path / n for n in ("a/ok.exr", "b/OK.exr", "b/other.exr"))
-    many._check_worlds([a, other])
-    for pair in ([a, b], [a, a]):
-        with pytest.raises(SceneError, match="one picture"):
-            many._check_worlds(pair)
-    with pytest.raises(SceneError, match="no environment map"):
-        many._check_worlds([a, tmp_path / "none.exr"])
+
+    def wrong(*worlds):
+        pictures = ahead.wanted(scene, worlds, 1, ())
+        found = ahead._names(pictures)
+        return [str(found.get(p) or ahead._map(p.file) or "") for p in pictures]
+
+    assert wrong(a, other) == ["", ""]
+    assert all("one picture" in text for text in wrong(a, b) + wrong(a, a))
+    (tmp_path / "cut.exr").write_bytes(a.read_bytes()[:-20])
+    (tmp_path / "text.hdr").write_text("no picture")
+    for name, match in (
+        ("none.exr", "no environment map"),
+        ("cut.exr", "HDRI"),
+        ("text.hdr", "HDRI"),
+    ):
+        good, bad = wrong(other, tmp_path / name)
+        assert not good and match in bad
+    # a world named as a file beside a plate is
+    assert wrong(tmp_path / "b" / "other.exr", a) == ["", ""]
+    names = {p.path.name for p in ahead.wanted(scene, [a, tmp_path / "ok_layers.exr"], 1, ())}
+    assert "shot_ok_layers.exr" not in names and len(names) == 2
+    scene.arto.output = ""
 
 
 def test_an_hdri_of_the_same_size_and_time_is_another(tmp_path):

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import os
 from types import SimpleNamespace
 from typing import Any
 
 import bpy
+import numpy as np
 import pytest
 from arto.arto_addon.capture.asked import asked
 from arto.arto_addon.farm.job import settings_of
@@ -16,6 +18,8 @@ from arto.arto_addon.settings.setting import Setting
 from arto.arto_addon.settings.table import SETTINGS
 from arto.arto_addon.ui import light_panel, more_panels, result_panel, shot_panel
 from arto.arto_addon.ui.lists import ENTRIES
+from arto.core import exr
+from arto.core.field.about import About
 from scene_tools import hdri, small_scene, smooth
 
 from tools import setting_types
@@ -99,6 +103,7 @@ def test_a_fit_decides_no_capture_whose_images_are_kept(scene, name):
 
 
 def test_lists_decide_what_they_say(scene):
+    scene.arto.layers = "GROUPS"
     before = keys(scene)
     for setting in (s for s in SETTINGS if s.kind == "list"):
         entry = getattr(scene.arto, setting.name).add()
@@ -109,6 +114,79 @@ def test_lists_decide_what_they_say(scene):
             setting.decides.of_plate,
         )
         getattr(scene.arto, setting.name).clear()
+
+
+# What no file of a plate has: how the window shows it, and the names by which it is found.
+OF_NO_PLATE = {
+    "look", "output", "use_in_compositor", "compare", "wipe", "live_finish", "looks",
+    "active_look", "active_own_group", "active_group",
+}  # fmt: skip
+
+
+def test_all_that_a_relight_reads_decides_a_plate():
+    """A new setting is in the key, unless it is of the window alone."""
+    read = {s.name: s.decides.of_plate for s in SETTINGS if s.work == "relight"}
+    assert {name for name, decides in read.items() if not decides} == OF_NO_PLATE
+
+
+def changed(scene, change) -> bool:
+    before = light_key(scene, scene.world)
+    change()
+    return light_key(scene, scene.world) != before
+
+
+def test_all_that_a_plate_shows_is_in_its_key(scene, tmp_path):
+    """Camera, frame, size, region, footage, groups: two plates of one key are the same."""
+    settings, render = scene.arto, scene.render
+    group = settings.groups.add()
+    other_camera = scene.camera.copy()
+    scene.collection.objects.link(other_camera)
+    filmed = tmp_path / "filmed.exr"
+    image = bpy.data.images.new("Mask", 4, 2)
+    render.use_border = True
+
+    def of(target, name, value):
+        return lambda: setattr(target, name, value)
+
+    def moved():
+        scene.camera.location.x += 1
+        scene.view_layers[0].update()
+
+    def written(value):
+        def write():
+            exr.write(filmed, {"": np.full((18, 24, 3), value, np.float32)})
+            os.utime(filmed, ns=(1, 1))
+            if settings.footage is None:
+                settings.footage = bpy.data.images.load(str(filmed))
+
+        return write
+
+    changes = [
+        moved, of(scene.camera.data, "lens", 40), of(scene, "camera", other_camera),
+        lambda: scene.frame_set(7), lambda: scene.frame_set(7, subframe=0.5),
+        of(render, "resolution_x", 48), of(render, "resolution_percentage", 50),
+        of(render, "border_max_x", 0.5),
+        of(render, "pixel_aspect_x", 2.0), of(render, "film_transparent", True),
+        of(scene.cycles, "film_transparent_glass", True),
+        of(scene.view_layers[0], "name", "Other"),
+        *(of(group, name, 0.3) for name in ("azimuth", "elevation", "radius", "soft")),
+        of(group, "name", "key"), of(group, "mask", image),
+        lambda: image.pixels.foreach_set(np.full(32, 0.7, np.float32)),
+        written(0.25), written(0.75),  # another picture of the same size and time
+    ]  # fmt: skip
+    assert not changed(scene, lambda: None)
+    for number, change in enumerate(changes):
+        assert changed(scene, change), number
+
+
+def test_another_field_makes_another_plate(scene):
+    def field(**about):
+        return SimpleNamespace(about=About(**about))
+
+    one = light_key(scene, scene.world, None, field(key="a", choice="auto"))
+    assert one == light_key(scene, scene.world, None, field(key="a", choice="auto"))
+    for about in ({"key": "b", "choice": "auto"}, {"key": "a", "choice": "box"}):
+        assert one != light_key(scene, scene.world, None, field(**about))
 
 
 def test_what_decides_a_capture_goes_to_a_farm(scene):

@@ -1,0 +1,115 @@
+"""Numbered files: which of a sequence Blender shows at a frame, and whether one is whole."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...core import exr
+from ...core.errors import ExrError
+from ...core.regular import open_regular
+
+# What a JPEG file ends with. Blender shows grey in place of what is cut off, and says nothing.
+_END_OF_JPEG = b"\xff\xd9"
+# Cameras write so many bytes behind a JPEG at most: in these its end is looked for.
+_BEHIND = 1 << 16
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Which picture of a sequence or movie is shown at a frame.
+
+    number: the picture's; held: whether the frame is outside of what the user's or node's duration
+    covers, so that Blender shows the first or last picture instead.
+    """
+
+    number: int
+    held: bool
+
+
+def shown_at(timing: Any, frame: int) -> Shown:
+    """The picture that an image's user or node shows at a frame, as Blender counts.
+
+    timing: has `frame_duration`, `frame_start`, `frame_offset` and `use_cyclic`.
+    """
+    length = timing.frame_duration
+    if length == 0:
+        return Shown(0, False)
+    number = frame - timing.frame_start + 1
+    if timing.use_cyclic:
+        return Shown((number - 1) % length + 1 + timing.frame_offset, False)
+    inside = min(max(number, 0), length)
+    return Shown(inside + timing.frame_offset, inside != number)
+
+
+def file_of(path: Path, number: int) -> Path:
+    """The file of a sequence with this number. path: any file of the sequence.
+
+    The number is the last one in the name, in as many digits. A path without a number is returned
+    as it is.
+    """
+    digits = _DIGITS.search(path.stem)
+    if not digits:
+        return path
+    text = f"{max(number, 0):0{len(digits[1])}d}"
+    stem = path.stem[: digits.start()] + text + path.stem[digits.end() :]
+    return path.with_name(stem + path.suffix)
+
+
+def number_of(path: Path) -> int | None:
+    """The number in a file's name that counts the files of a sequence; None without one."""
+    digits = _DIGITS.search(path.stem)
+    return int(digits[1]) if digits else None
+
+
+_DIGITS = re.compile(r"(\d+)(?=\D*$)")
+
+
+def whole_size(path: Path) -> tuple[int, int] | None:
+    """Decode a file of a picture -> its width and height; None where it cannot be decoded.
+
+    Of an EXR this is the display window. Raises ExrError for an EXR, with what is wrong with it.
+    """
+    if path.suffix.lower() == ".exr":
+        exr.whole_parts(path)
+        _, (x0, y0, x1, y1) = exr.windows(path)
+        return x1 - x0 + 1, y1 - y0 + 1
+    if path.suffix.lower() in {".jpg", ".jpeg"} and _is_cut(path):
+        return None
+    try:
+        image = bpy.data.images.load(str(path))
+    except RuntimeError:
+        return None
+    try:
+        # Blender reads the file when it is asked for the size
+        size = tuple(image.size)
+        return (size[0], size[1]) if min(size) else None
+    finally:
+        bpy.data.images.remove(image)
+
+
+def damage(path: Path) -> str:
+    """Say what is wrong with a file of a picture, in words; "" for a file that is whole."""
+    if not path.is_file():
+        return f"{path} is not there"
+    try:
+        if whole_size(path) is None:
+            return f"{path} cannot be read, it is damaged or cut off"
+    except ExrError as e:
+        return str(e).partition(": ")[0]
+    return ""
+
+
+def _is_cut(path: Path) -> bool:
+    """Whether the end of a JPEG file is missing."""
+    try:
+        with open_regular(path, follow=True) as file:
+            size = file.seek(0, 2)
+            file.seek(max(size - _BEHIND, 0))
+            return _END_OF_JPEG not in file.read()
+    except OSError:
+        return True

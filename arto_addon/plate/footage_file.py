@@ -1,0 +1,101 @@
+"""The files of footage: which of them is shown at a frame, and whether it is there and whole."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...core.errors import ExrError, SceneError
+from ..blender.sequences import Shown, damage, file_of, number_of, shown_at, whole_size
+
+
+def file_at(source: Any, timing: Any, frame: int) -> Path | None:
+    """The file of an image or clip that is shown at a frame of the scene; None without such a file.
+
+    timing: an image's user or node. The file may be missing.
+    """
+    if source.source not in {"FILE", "SEQUENCE"} or getattr(source, "packed_file", None):
+        return None
+    path = Path(bpy.path.abspath(source.filepath, library=source.library))
+    if source.source == "FILE":
+        return path
+    return file_of(path, _shown(source, timing, frame, path).number)
+
+
+def _shown(source: Any, timing: Any, frame: int, path: Path) -> Shown:
+    """Which picture of a sequence or movie is shown at a frame."""
+    if isinstance(source, bpy.types.MovieClip):
+        first = number_of(path) if source.source == "SEQUENCE" else 1
+        number = (first or 0) + frame - source.frame_start + source.frame_offset
+        return Shown(number, False)
+    return shown_at(timing, frame) if timing is not None else Shown(frame, False)
+
+
+def check(source: Any, timing: Any, frame: int) -> str:
+    """Look at what an image or clip shows at a frame; returns a warning in words, or "".
+
+    Raises SceneError where the file of the frame is missing or damaged, where it is of another size
+    than the sequence, or where a movie has no such frame.
+    """
+    if source.source not in {"FILE", "SEQUENCE", "MOVIE"} or getattr(source, "packed_file", None):
+        return ""
+    path = Path(bpy.path.abspath(source.filepath, library=source.library))
+    held = source.source != "FILE" and _shown(source, timing, frame, path).held
+    warning = (
+        f"the footage '{source.name}' does not last until frame {frame}: another of its pictures "
+        "is held"
+    )
+    if source.source == "MOVIE":
+        _check_movie(source, timing, frame, path)
+        return warning if held else ""
+    file = file_at(source, timing, frame)
+    assert file is not None
+    if wrong := _damage(file, _state(file)):
+        raise SceneError(
+            f"the footage '{source.name}' of frame {frame} cannot be used ({wrong}): put the file "
+            "there, or choose other footage"
+        )
+    if source.source == "SEQUENCE" and path != file and path.is_file():
+        here, there = _size(file, _state(file)), _size(path, _state(path))
+        if here and there and here != there:
+            raise SceneError(
+                f"the footage '{source.name}' has {here[0]}x{here[1]} pixels in {file.name}, and "
+                f"{there[0]}x{there[1]} in {path.name}: bring the sequence to one size"
+            )
+    return warning if held else ""
+
+
+def _check_movie(source: Any, timing: Any, frame: int, path: Path) -> None:
+    """Raise SceneError where a movie does not have the frame that is shown."""
+    number, length = _shown(source, timing, frame, path).number, source.frame_duration
+    if length > 1 and not 1 <= number <= length:
+        raise SceneError(
+            f"the footage '{source.name}' has {length} frames, and at frame {frame} its frame "
+            f"{number} is asked for: set its start, or choose other footage"
+        )
+
+
+def _state(path: Path) -> tuple[int, ...]:
+    """What changes when a file is replaced."""
+    if not path.is_file():
+        return ()
+    state = path.stat()
+    return state.st_ino, state.st_size, state.st_mtime_ns, state.st_ctime_ns
+
+
+# A file is decoded once for the look ahead, the first picture and the next ones. The second
+# argument of both functions is the state for which an answer holds.
+@lru_cache(4096)
+def _damage(path: Path, _: tuple[int, ...]) -> str:
+    return damage(path)
+
+
+@lru_cache(4096)
+def _size(path: Path, _: tuple[int, ...]) -> tuple[int, int] | None:
+    try:
+        return whole_size(path)
+    except ExrError:
+        return None

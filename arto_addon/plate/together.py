@@ -1,0 +1,123 @@
+"""The files of a plate, put in place together, and those of an earlier plate that go with them.
+
+Beside a plate there may be its layers, its data, its shadows and its composite over footage. All of
+them are of one light. So none is put in place before all are complete, and what an earlier relight
+has left beside the plate and this one does not write is removed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from types import TracebackType
+
+from ...core import exr, marked
+from ...core.errors import ArtoError, ExrError
+from ...core.files import whole
+from .plate import LAYERS, full_file, layers_prefix
+
+# The attribute in the header of each file of a plate that names the plate's own file.
+PLATE = "arto.plate"
+# Attributes that files of earlier versions have, which do not name their plate.
+_OF_EARLIER = ("arto.light key", "arto.verify")
+# What the names of files beside a plate end with.
+ENDINGS = ("catcher", "light", "layers", "data", "comp", "verify")
+
+
+class Together:
+    """A context manager in which the files of a plate are written.
+
+    At the end of the block the files take their names, the plate's own file last. If the block
+    fails, nothing is changed. Raises ExrError where a file cannot be put in its place.
+    """
+
+    def __init__(self, plate: Path, prefix: str | None) -> None:
+        """prefix: of the names of layers' own files; None where there are no such files."""
+        self.plate = plate
+        self.written: list[Path] = []
+        self.removed: list[Path] = []
+        known = (prefix, _older_prefix(plate))
+        self._prefixes = {name for name in known if name is not None}
+        self._held = ExitStack()
+        self._partial: Path | None = None
+
+    def __enter__(self) -> Together:
+        try:
+            # entered first, so put in its place last
+            self._partial = self._held.enter_context(whole(self.plate))
+        except OSError as e:
+            raise _cannot(self.plate, e) from e
+        return self
+
+    @contextmanager
+    def file(self, path: Path) -> Iterator[Path]:
+        """Give the path to write a file to; the file takes its name at the end of the block."""
+        if path == self.plate:
+            assert self._partial is not None
+            yield self._partial
+        else:
+            yield self._held.enter_context(whole(path))
+        self.written.append(path)
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        at: TracebackType | None,
+    ) -> None:
+        try:
+            if error is None:
+                self._remove_others()
+            self._held.__exit__(kind, error, at)
+        except OSError as e:
+            raise _cannot(self.plate, e) from e
+
+    def _remove_others(self) -> None:
+        for path in beside(self.plate, self._prefixes):
+            same = any(path.name.casefold() == there.name.casefold() for there in self.written)
+            if not same and marked.remove_own_file(path, lambda path: is_of(path, self.plate)):
+                self.removed.append(path)
+
+
+def _older_prefix(plate: Path) -> str | None:
+    """The prefix of the files of layers beside the plate that is there now."""
+    if not plate.is_file():
+        return None
+    try:
+        return layers_prefix(plate, str(exr.header(plate).get(LAYERS, "")))
+    except ExrError:
+        return None
+
+
+def _cannot(path: Path, error: OSError) -> ExrError:
+    return ExrError(
+        f"{path} cannot be written ({error}): make room on the disk, or choose a folder that can "
+        "be written"
+    )
+
+
+def beside(plate: Path, prefixes: set[str]) -> list[Path]:
+    """Files that have names as ARTO gives them beside a plate. prefixes: of the names of layers."""
+    found = [plate.with_name(f"{plate.stem}_{ending}.exr") for ending in ENDINGS]
+    found += [full_file(path) for path in (plate, *found)]
+    there = {path for path in found if path.is_file()}
+    begins = tuple(f"{plate.stem}_{prefix}" for prefix in prefixes)
+    if begins and plate.parent.is_dir():
+        names = (path for path in plate.parent.iterdir() if path.suffix == ".exr")
+        there |= {path for path in names if path.name.startswith(begins)}
+    return sorted(there)
+
+
+def is_of(path: Path, plate: Path) -> bool:
+    """Whether ARTO has written a file beside a plate, by what the file's header says."""
+    try:
+        head = exr.header(path)
+    except ArtoError:
+        return False
+    if PLATE in head:
+        return str(head[PLATE]) == plate.name
+    # the names of layers' own files are the artist's: another plate may have such a name
+    named = any(path.stem == f"{plate.stem}_{e}" for e in (*ENDINGS, "full"))
+    named = named or any(path.stem == f"{plate.stem}_{e}_full" for e in ENDINGS)
+    return named and any(name in head for name in _OF_EARLIER)

@@ -1,0 +1,325 @@
+"""Looking ahead: what would end a relight later is found before its first second of work.
+
+Fields, worlds, frames, footage, Cryptomattes, names of files and room on the disk are looked at for
+all pictures that were asked for.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import bpy
+
+from ...core.errors import ArtoError, CaptureSetError, SceneError, StrictError
+from ...core.units import size
+from ..blender import sequences
+from ..capture.sequence import frame_kept
+from ..plate import mattes, plate
+from ..plate.footage import footage
+from ..plate.names import numbers_frames, of_look, relit_file
+from ..plate.together import ENDINGS
+from ..shot import paths
+from ..shot.shot import check_same_shot, shot_of
+from ..work import Progress, Steps
+from ..world.check import check_images, check_world, differs_by_rays
+from ..world.images import files_at, image_nodes
+from . import layers
+from .shown import Shown
+
+# How small compressed files of pictures are, as a share of their pixels, where they are small: a
+# disk that has room for so much may still become full, and one that has not is told of at once.
+_PACKED = 0.5
+# The longest name of a file that disks take, in bytes.
+_LONGEST = 255
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A picture that is to be made.
+
+    path: of its EXR; frame: None for the scene's present one; file: an environment map in the
+    place of the scene's world, or None; turn: of a turntable, as a share of the whole circle.
+    """
+
+    path: Path
+    frame: int | None = None
+    file: Path | None = None
+    turn: float = 0.0
+
+
+def wanted(
+    scene: bpy.types.Scene, worlds: Sequence[Path], turns: int, frames: Sequence[int]
+) -> list[Wanted]:
+    """List the pictures of some worlds, of a turntable or of frames, in the order of the work.
+
+    Each is named after its map and numbered by turn or frame. Raises SceneError where the pictures
+    have no place to go.
+    """
+    out = []
+    for frame in frames or [None]:
+        base = relit_file(scene, frame=frame)
+        for file in worlds or [None]:
+            for turn in range(turns):
+                number = frame if frame is not None else turn + 1 if turns > 1 else None
+                if frame is not None and numbers_frames(scene):
+                    number = None  # it is in the name already
+                path = _named(base, file, number)
+                out.append(Wanted(path, frame, file, turn / turns))
+    return out
+
+
+def _named(base: Path, file: Path | None, number: int | None) -> Path:
+    """The path of one of many pictures, as in `shot_sunset_0001.exr`."""
+    parts = [base.stem, *([of_look(file.stem)] if file else [])]
+    parts += [f"{number:04d}"] if number is not None else []
+    return base.with_name("_".join(parts) + ".exr")
+
+
+def look(
+    scene: bpy.types.Scene, view_layer: str, pictures: Sequence[Wanted], strict: bool
+) -> Steps:
+    """Look at all that some pictures need -> what is wrong, an ArtoError by picture.
+
+    The scene is put back to its frame. strict: whether the scene may not have changed since the
+    capture.
+    """
+    wrong = _names(pictures)
+    wrong |= {p: e for p in pictures if p.file and p not in wrong and (e := _map(p.file))}
+    missing = missing_frames(scene, view_layer, [p.frame for p in pictures if p.frame is not None])
+    still = None
+    needed: dict[Path, int] = {}
+    with frame_kept(scene):
+        for number, frame in enumerate(every := list(dict.fromkeys(p.frame for p in pictures))):
+            some = [p for p in pictures if p.frame == frame and p not in wrong]
+            try:
+                if frame is not None:
+                    if len(every) > 1:
+                        yield Progress(0.0, f"looking at frame {number + 1} of {len(every)}")
+                    scene.frame_set(frame)
+                    scene.view_layers[view_layer].update()
+                    if frame in missing:
+                        raise missing[frame]
+                still = shown_at(scene, view_layer, still)
+                check_frame(still, own_world=any(p.file is None for p in some), strict=strict)
+            except ArtoError as e:
+                wrong |= dict.fromkeys(some, e)
+                continue
+            for one in some:
+                try:
+                    check_picture(still, one.path, file=one.file)
+                    needed[one.path] = bytes_of(still)
+                except ArtoError as e:
+                    wrong[one] = e
+    try:
+        _check_room(needed)
+    except ArtoError as e:
+        wrong |= {p: e for p in pictures if p not in wrong}
+    return wrong
+
+
+def summed(wrong: Mapping[Wanted, ArtoError], total: int) -> ArtoError:
+    """One error for what is wrong with some of many pictures."""
+    first = next(iter(wrong.values()))
+    if len(set(map(str, wrong.values()))) == 1:
+        return first
+    said = list(dict.fromkeys(f"{p.path.name}: {e}" for p, e in wrong.items()))
+    more = f"\n  and {len(said) - 10} more" if len(said) > 10 else ""
+    return type(first)(
+        f"{len(wrong)} of {total} pictures cannot be made, so none was begun (--keep-going makes "
+        "the others):\n  " + "\n  ".join(said[:10]) + more
+    )
+
+
+def _names(pictures: Sequence[Wanted]) -> dict[Wanted, ArtoError]:
+    """Pictures that would be written over another one."""
+    by_name: dict[str, list[Wanted]] = {}
+    for one in pictures:
+        # Windows and macOS do not tell upper from lower case in names
+        by_name.setdefault(str(one.path).casefold(), []).append(one)
+    wrong: dict[Wanted, ArtoError] = {}
+    for same in by_name.values():
+        if len(same) > 1:
+            files = " and ".join(str(p.file or p.path) for p in same[:3])
+            error = SceneError(
+                f"{files} would be written to one picture, {same[0].path.name}: give one of them "
+                "another name, or relight them one after the other"
+            )
+            wrong |= dict.fromkeys(same, error)
+    return wrong
+
+
+def _map(file: Path) -> ArtoError | None:
+    """What is wrong with the file of an environment map."""
+    if not file.is_file():
+        return SceneError(f"there is no environment map {file}")
+    if wrong := sequences.damage(file):
+        return SceneError(f"{wrong}: copy it anew, or choose another HDRI")
+    return None
+
+
+def missing_frames(
+    scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]
+) -> dict[int, ArtoError]:
+    """Frames that were not captured, or not to the end, of a shot of which several frames were.
+
+    With one captured frame the shot is a still, and its world may be animated.
+    """
+    begun = paths.frames(scene, view_layer)
+    there = sorted(frame for frame, whole in begun.items() if whole)
+    missing = [frame for frame in frames if frame not in there]
+    if not missing or not there or (len(begun) == 1 and len(there) == 1):
+        return {}
+    known = ", ".join(f"{n:g}" for n in there[:10])
+    some = ", ".join(str(frame) for frame in missing[:10]) + (", ..." if missing[10:] else "")
+    error = CaptureSetError(
+        f"of this shot the frames {known} are captured, and {some} not, "
+        "or not to the end: capture these too (--frames), or discard what is unfinished"
+    )
+    return dict.fromkeys(missing, error)
+
+
+def shown_at(scene: bpy.types.Scene, view_layer: str, still: Shown | None) -> Shown:
+    """Open the field of the scene's frame; of the still, where this frame was not captured.
+
+    still: what this function returned for an earlier frame. Raises what `Shown` raises.
+    """
+    folder = paths.field_folder(scene, view_layer)
+    if folder.exists():
+        found = Shown(scene, view_layer, folder)
+        check_same_shot(scene, found.field.about.shot, "the reflectance field", view_layer)
+        return found
+    now = shot_of(scene, view_layer)
+    near = paths.nearest(scene, view_layer)
+    if still is None and near is None:
+        return Shown(scene, view_layer)  # raises an error that says what to do
+    if still is None:
+        assert near is not None
+        with frame_kept(scene):
+            scene.frame_set(near.frame)
+            still = Shown(scene, view_layer, paths.field_folder(scene, view_layer))
+    was = still.field.about.shot or now
+    if difference := replace(was, frame=now.frame, subframe=now.subframe).difference(now):
+        raise CaptureSetError(
+            f"frame {now.frame} was not captured, and differs from frame {was.frame} by "
+            f"{difference}: capture it too (--frames)"
+        )
+    return still
+
+
+def check_frame(shown: Shown, own_world: bool, strict: bool) -> None:
+    """Look at what all pictures of a frame need, besides their own files.
+
+    own_world: whether the scene's own world is shown. Raises ArtoError.
+    """
+    scene = shown.scene
+    for take in shown.takes:
+        take.field.has_layer("alpha")  # raises where a tile is missing or damaged
+    plate.window_of(scene).check(shown.field.shape)
+    shown.footage_warning()
+    shown.mattes()
+    if own_world:
+        check_images(check_world(scene, shown.layer), scene.frame_current)
+    if strict and (changed := shown.changed()):
+        raise StrictError(f"the scene is not the captured one: {'; '.join(changed[:3])}")
+    if strict and own_world and (by_rays := differs_by_rays(check_world(scene, shown.layer))):
+        raise StrictError(f"the world is {by_rays}")
+
+
+def check_picture(
+    shown: Shown, path: Path, world: bpy.types.World | None = None, file: Path | None = None
+) -> None:
+    """Look at where a picture and the files beside it will be written.
+
+    world: that is shown (default: the scene's); file: an environment map instead. Raises SceneError
+    where they cannot be written there, or would be written over what they are made of.
+    """
+    scene = shown.scene
+    layers.check(scene, path, shown.field)
+    outputs = [path, *(path.with_name(f"{path.stem}_{ending}.exr") for ending in ENDINGS)]
+    outputs += [plate.full_file(output) for output in outputs]
+    longest = max(len(output.name.encode("utf-8", "surrogatepass")) for output in outputs)
+    if longest > _LONGEST:
+        raise SceneError(
+            f"'{path.name}' and what is added to it for files beside it is {longest} bytes long, "
+            f"and disks take {_LONGEST}: shorten the output's name"
+        )
+    if path.is_dir():
+        raise SceneError(f"{path} is a folder: choose another output")
+    there = path.parent
+    while not os.path.lexists(there) and there != there.parent:
+        there = there.parent
+    if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
+        raise SceneError(
+            f"nothing can be written into {path.parent}: see who may write there, or choose "
+            "another output"
+        )
+    taken = {_real(output) for output in outputs}
+    for what, read in _inputs(shown, world, file):
+        if _real(read) in taken:
+            raise SceneError(
+                f"the picture would be written over {what}, {read}: choose another output"
+            )
+    _check_room({path: bytes_of(shown)})
+
+
+def _real(path: Path) -> str:
+    return os.path.normcase(os.path.realpath(path))
+
+
+def _inputs(
+    shown: Shown, world: bpy.types.World | None, file: Path | None
+) -> Iterable[tuple[str, Path]]:
+    """The files that a picture is made of, with what they are in words."""
+    scene = shown.scene
+    if file:
+        yield "its environment map", file
+    else:
+        world = world or check_world(scene, shown.layer)
+        for node in image_nodes(world):
+            for path in files_at(node, scene.frame_current):
+                yield "the world's image", path
+    if (found := footage(scene)) and (filmed := found.file(scene)):
+        yield "the footage", filmed
+    if rendered := mattes.file_of(scene, shown.field):
+        yield "the Cryptomattes", rendered
+
+
+def bytes_of(shown: Shown) -> int:
+    """About the bytes of a picture on disk, with the files beside it; rather too few."""
+    settings, (height, width) = shown.scene.arto, shown.field.shape
+    shown_twice = 1 + plate.window_of(shown.scene).crop
+    a_pixel = 16 * shown_twice
+    if len(shown.takes) > 1:
+        a_pixel += 12 * shown_twice + 12
+    if settings.write_data:
+        a_pixel += 4 * sum(len(letters) for letters in plate.DATA.values())
+        a_pixel += 48 if settings.cryptomatte else 0
+    if settings.layers != "OFF":
+        parts = len(settings.groups) + 1 if settings.layers == "GROUPS" else 6
+        a_pixel += (6 if settings.layers_half else 12) * parts * shown_twice
+    return round(a_pixel * height * width * _PACKED)
+
+
+def _check_room(needed: Mapping[Path, int]) -> None:
+    """Raise SceneError where a disk has no room for pictures. needed: bytes by the pictures' paths.
+
+    A picture takes the place of an older one, which counts as room.
+    """
+    by_folder: dict[Path, int] = {}
+    for path, more in needed.items():
+        there = path.parent
+        while not there.exists() and there != there.parent:
+            there = there.parent
+        old = path.stat().st_size if path.is_file() else 0
+        by_folder[there] = by_folder.get(there, 0) + max(more - old, 0)
+    for folder, more in by_folder.items():
+        free = shutil.disk_usage(folder).free
+        if free < more:
+            raise SceneError(
+                f"the pictures need about {size(more)} of disk, and {folder} has {size(free)} "
+                "free: make room, or choose another output"
+            )
