@@ -12,7 +12,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import bpy
 
@@ -78,7 +78,7 @@ _Made = TypeVar("_Made")
 Steps = Generator[Progress | Render, None, _Made]
 
 
-def _last_properties() -> Any:
+def _last_properties() -> bpy.types.OperatorProperties | None:
     # looked up at each call: Blender replaces the object
     return bpy.context.window_manager.operator_properties_last("render.render")
 
@@ -88,15 +88,15 @@ def last_properties_kept() -> Iterator[None]:
     """Put back the properties of the last render, which Blender uses again for the next F12."""
     last = _last_properties()
     names = [p.identifier for p in last.bl_rna.properties if not p.is_readonly] if last else []
-    before = {n: getattr(last, n) for n in names if last.is_property_set(n)}
+    before = {n: getattr(last, n) for n in names if last and last.is_property_set(n)}
     try:
         yield
     finally:
         last = _last_properties()
         for name in names:
-            if name in before:
+            if last and name in before:
                 setattr(last, name, before[name])
-            else:
+            elif last:
                 last.property_unset(name)
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import TypeVar
 
 import bpy
 
 from .version import FIVE
+
+# What goes into a node: a socket to link, or the value of the node's own socket.
+Input = bpy.types.NodeSocket | float | Sequence[float]
+_Block = TypeVar("_Block", bound=bpy.types.ID)
 
 
 class Nodes:
@@ -16,7 +20,7 @@ class Nodes:
     def __init__(self, tree: bpy.types.NodeTree) -> None:
         self.tree = tree
 
-    def add(self, kind: str, *inputs: Any, operation: str = "") -> Any:
+    def add(self, kind: str, *inputs: Input, operation: str = "") -> bpy.types.Node:
         """Add a node. Each input that is a socket is linked, and any other is set as a value."""
         node = self.tree.nodes.new(kind)
         if operation:
@@ -28,7 +32,7 @@ class Nodes:
                 socket.default_value = value
         return node
 
-    def math(self, operation: str, *inputs: Any) -> Any:
+    def math(self, operation: str, *inputs: Input) -> bpy.types.NodeSocket:
         """Add a Math node, and return its output socket."""
         return self.add("ShaderNodeMath", *inputs, operation=operation).outputs[0]
 
@@ -43,7 +47,7 @@ def new_world(name: str) -> bpy.types.World:
     return _noded(bpy.data.worlds.new(name))
 
 
-def _noded(block: Any) -> Any:
+def _noded(block: _Block) -> _Block:
     if not FIVE:
         block.use_nodes = True
     return block

@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import bpy
 
@@ -118,7 +117,7 @@ def asked(
         )
         # the key holds no names: a renamed file or scene goes on with its unfinished capture
         frame = [shot.camera_matrix, shot.lens, shot.frame, shot.subframe, shot.view_layer]
-        everything: list[Any] = [
+        everything: list[object] = [
             head.to_json(),
             vars(region),
             frame,

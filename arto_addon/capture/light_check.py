@@ -7,8 +7,6 @@ as a difference between the pictures, whether this module knows of them or not.
 
 from __future__ import annotations
 
-from typing import Any
-
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -159,7 +157,7 @@ def _cause(on: Stage) -> str:
     return "a material or a setting treats a world's light otherwise than light from surfaces"
 
 
-def _asks_for_shadow_rays(material: Any) -> bool:
+def _asks_for_shadow_rays(material: bpy.types.Material) -> bool:
     return any(
         node.bl_idname == "ShaderNodeLightPath" and node.outputs["Is Shadow Ray"].is_linked
         for tree in trees(shader_tree(material), set())

@@ -7,7 +7,6 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
 
 import bpy
 import numpy as np
@@ -16,7 +15,7 @@ from ...core.capture.names import GRAIN, GROUP, group_name
 from ...core.faces import FACE_NAMES
 from ...core.hemicube import Hemicube
 from ...core.patterns import BASE, SHARP, PatternSet, pattern_set
-from ..blender.nodes import Nodes, made_of_nodes, new_material
+from ..blender.nodes import Input, Nodes, made_of_nodes, new_material
 from ..stage.stage import Stage, free_mark
 
 COLLECTION = "ARTO Hemicube"
@@ -53,11 +52,13 @@ def wanted(scene: bpy.types.Scene, centre: Iterable[float], radius: float) -> He
     )
 
 
+# Notes a new data-block, and returns it.
+Made = Callable[[bpy.types.ID], bpy.types.ID]
 # Grains along a patch's side: far finer than the part of a patch that a pixel reflects.
 GRAINS = 2.0**14
 
 
-def _polynomial(nodes: Nodes, coefficients: Iterable[float]) -> Any:
+def _polynomial(nodes: Nodes, coefficients: Iterable[float]) -> bpy.types.NodeSocket:
     """The value of a polynomial over `patterns.MONOMIALS` of the UV map."""
     split = nodes.add("ShaderNodeSeparateXYZ", nodes.add("ShaderNodeUVMap").outputs[0])
     u, v = split.outputs[0], split.outputs[1]
@@ -69,7 +70,7 @@ def _polynomial(nodes: Nodes, coefficients: Iterable[float]) -> Any:
         nodes.math("MULTIPLY", v, v),
         nodes.math("MULTIPLY", u, v),
     )
-    total: Any = 0.0
+    total: Input = 0.0
     for coefficient, term in zip(coefficients, terms, strict=True):
         if coefficient:
             total = nodes.math("MULTIPLY_ADD", term, float(coefficient), total)
@@ -77,7 +78,7 @@ def _polynomial(nodes: Nodes, coefficients: Iterable[float]) -> Any:
     return nodes.math("MAXIMUM", total, 0.0)
 
 
-def _grain(nodes: Nodes) -> Any:
+def _grain(nodes: Nodes) -> bpy.types.NodeSocket:
     """A random value for each grain: 1 on half of the grains, 0 on the others."""
     scaled = nodes.add(
         "ShaderNodeVectorMath",
@@ -92,7 +93,7 @@ def _grain(nodes: Nodes) -> Any:
     return nodes.math("GREATER_THAN", noise.outputs["Value"], 0.5)
 
 
-def _radiance(nodes: Nodes, name: str, patterns: PatternSet) -> list[Any]:
+def _radiance(nodes: Nodes, name: str, patterns: PatternSet) -> list[Input]:
     """What a pattern of the set, or `GRAIN`, emits: sockets or values, one for all channels or one
     for each."""
     if name == GRAIN:
@@ -102,7 +103,7 @@ def _radiance(nodes: Nodes, name: str, patterns: PatternSet) -> list[Any]:
     ]
 
 
-def _shader(nodes: Nodes, radiance: list[Any]) -> Any:
+def _shader(nodes: Nodes, radiance: list[Input]) -> bpy.types.NodeSocket:
     """Emission, plus what lies behind; radiance: see `_radiance`.
 
     The background lies behind the last pattern. There Cycles adds the scene's sun lamps to
@@ -117,7 +118,7 @@ def _shader(nodes: Nodes, radiance: list[Any]) -> Any:
     return nodes.add("ShaderNodeAddShader", light, behind).outputs[0]
 
 
-def pattern_material(name: str, patterns: PatternSet, sampled: bool = False) -> Any:
+def pattern_material(name: str, patterns: PatternSet, sampled: bool = False) -> bpy.types.Material:
     """Emission of a pattern of the set (or of `GRAIN`), plus what lies behind."""
     material = new_material(f"ARTO {name}")
     # paths find the patches, and no shadow ray is cast at them: Cycles' limit of 255 light groups
@@ -131,8 +132,8 @@ def pattern_material(name: str, patterns: PatternSet, sampled: bool = False) -> 
 
 
 def overriding_material(
-    override: Any, names: list[str], patterns: PatternSet, sampled: bool = False
-) -> Any:
+    override: bpy.types.Material, names: list[str], patterns: PatternSet, sampled: bool = False
+) -> bpy.types.Material:
     """A view layer's material override, on the artist's objects; on a plane, its pattern.
 
     Blender puts the override on every object, whatever the object's slots hold. So one material
@@ -148,7 +149,7 @@ def overriding_material(
     number = tree.nodes.new("ShaderNodeAttribute")
     number.attribute_type, number.attribute_name = "OBJECT", PATTERN
     shown = [_radiance(nodes, name, patterns) for name in names]
-    total: list[Any] = [0.0] * max(map(len, shown))
+    total: list[Input] = [0.0] * max(map(len, shown))
     for i, channels in enumerate(shown, 1):
         mine = nodes.math("COMPARE", number.outputs["Fac"], float(i), 0.5)
         for c in range(len(total)):
@@ -175,7 +176,9 @@ def overriding_material(
     return material
 
 
-def _plane(name: str, corners: np.ndarray, material: Any, made: Callable[[Any], Any]) -> Any:
+def _plane(
+    name: str, corners: np.ndarray, material: bpy.types.Material, made: Made
+) -> bpy.types.Object:
     mesh = made(bpy.data.meshes.new(name))
     mesh.from_pydata(corners.tolist(), [], [(0, 1, 2, 3)])
     uv = mesh.uv_layers.new(name="UVMap")
@@ -190,7 +193,7 @@ def _plane(name: str, corners: np.ndarray, material: Any, made: Callable[[Any], 
     return plane
 
 
-def _seen_by(plane: Any, paths: str) -> None:
+def _seen_by(plane: bpy.types.Object, paths: str) -> None:
     """Hide a plane from the light paths that are not to see it; see `patterns.PATHS`.
 
     A path sees either all planes of the base or all of the sharp ones: what it left last is either
@@ -205,7 +208,7 @@ def build(
     hemicube: Hemicube,
     patterns: PatternSet,
     images: Iterable[tuple[int, str]],
-    made: Callable[[Any], Any],
+    made: Made,
     mark: str = "",
     sampled: bool = False,
 ) -> None:
@@ -234,9 +237,7 @@ def build(
 NONE = 1000.0
 
 
-def _threshold(
-    collection: bpy.types.Collection, hemicube: Hemicube, made: Callable[[Any], Any]
-) -> None:
+def _threshold(collection: bpy.types.Collection, hemicube: Hemicube, made: Made) -> None:
     """A clear shell before the patterns, at which Cycles tosses its coin.
 
     Russian roulette ends a path, or makes it count for more, at the first surface that it meets
@@ -274,12 +275,12 @@ def lit(
     sampled: whether Cycles also casts shadow rays at the patches, as it does at a world; it can do
     so for at most `MOST_SAMPLED` images. own: whether the artist's light groups are written too.
     """
-    made: list[Any] = []
+    made: list[bpy.types.ID] = []
     images = list(images)
     if sampled and len(images) > MOST_SAMPLED:
         raise ValueError(f"{len(images)} sampled patches; Cycles tells {MOST_SAMPLED} apart")
 
-    def note(block: Any) -> Any:
+    def note(block: bpy.types.ID) -> bpy.types.ID:
         made.append(block)
         return on.made(block)
 
@@ -311,7 +312,9 @@ def lit(
         on.remove(made)
 
 
-def build_for_artist(scene: bpy.types.Scene, hemicube: Hemicube, radius: float) -> Any:
+def build_for_artist(
+    scene: bpy.types.Scene, hemicube: Hemicube, radius: float
+) -> bpy.types.Collection:
     """Put the hemicube into the artist's scene, to look at -> its collection.
 
     It is not rendered there, because it would hide the world. A capture builds another hemicube
@@ -330,7 +333,7 @@ def build_for_artist(scene: bpy.types.Scene, hemicube: Hemicube, radius: float) 
     return collection
 
 
-def of_artist(scene: bpy.types.Scene) -> Any | None:
+def of_artist(scene: bpy.types.Scene) -> bpy.types.Collection | None:
     """The collection that `build_for_artist` made in this scene, or None."""
     return next((c for c in scene.collection.children if "arto_hemicube" in c), None)
 

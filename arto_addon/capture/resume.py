@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 from ...core import marked
 from ...core.capture import head as heads
@@ -74,7 +73,9 @@ def finish(unfinished: Path, folder: Path) -> None:
         ) from e
 
 
-def let_go(folder: Path, head: CaptureHead, number: int, fitted: dict[str, Any]) -> CaptureHead:
+def let_go(
+    folder: Path, head: CaptureHead, number: int, fitted: Mapping[str, object]
+) -> CaptureHead:
     """Note down that a tile was fitted, then remove its basis images -> the new head."""
     files = head.tiles[number].files
     head = head.with_tile(number, files=(), seeds=(), sums={}, fitted=fitted)

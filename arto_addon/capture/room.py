@@ -7,7 +7,6 @@ import shutil
 import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from ...core.errors import SceneError
 from ...core.region import Region
@@ -90,7 +89,7 @@ class Estimate:
     kept: int
     renders: int
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         return asdict(self)
 
     def times(self, takes: int) -> Estimate:

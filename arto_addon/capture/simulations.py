@@ -7,7 +7,6 @@ baked cache is used by both.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import bpy
 
@@ -21,7 +20,7 @@ def unbaked(scene: bpy.types.Scene, view_layer: str) -> str:
     return ""
 
 
-def _caches(scene: bpy.types.Scene, view_layer: str) -> Iterator[tuple[str, Any]]:
+def _caches(scene: bpy.types.Scene, view_layer: str) -> Iterator[tuple[str, bpy.types.PointCache]]:
     """Each simulation of what is rendered: its name and its cache."""
     bodies = scene.rigidbody_world
     if bodies and bodies.enabled and bodies.collection:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import contextlib
 import threading
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from ...core.capture.capture_set import CaptureSet
 from ...core.errors import CancelledError
@@ -26,7 +26,7 @@ class Stream:
         self.folder = folder
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
-        self._entry: dict[str, Any] | None = None
+        self._entry: Mapping[str, object] | None = None
         self._error: BaseException | None = None
         self._number = 0
         self.share = 0.0
@@ -45,7 +45,7 @@ class Stream:
         self._thread = threading.Thread(target=work, name=f"ARTO fits tile {number}")
         self._thread.start()
 
-    def _fit(self, captured: CaptureSet, number: int) -> dict[str, Any]:
+    def _fit(self, captured: CaptureSet, number: int) -> Mapping[str, object]:
         def look(share: float) -> None:
             self.share = share
             if self._stop.is_set():
@@ -53,7 +53,7 @@ class Stream:
 
         return driven(fit_into(captured, number, self.folder / self.FIELD), look)
 
-    def ended(self, patience: float | None) -> tuple[int, dict[str, Any]] | None:
+    def ended(self, patience: float | None) -> tuple[int, Mapping[str, object]] | None:
         """The number of the tile that was fitted, and its entry in `field.json`.
 
         None where no tile is being fitted, or the fit takes longer than `patience` seconds. Raises

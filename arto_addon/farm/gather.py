@@ -6,7 +6,6 @@ import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import bpy
 
@@ -107,7 +106,7 @@ class Found:
     folder: Path | None
     files: tuple[str, ...] = ()
     samples: int = 0
-    fitted: Mapping[str, Any] | None = None
+    fitted: Mapping[str, object] | None = None
     sums: Mapping[str, int] = field(default_factory=dict)
 
 

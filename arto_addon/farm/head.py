@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
 
 from ...core import signed
 from ...core.capture.head import LARGEST_FRAME, LONGEST
@@ -62,7 +61,7 @@ class Part:
             take=said.one_of("take", Take) or Take.WHOLE,
         )
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         said = dict(vars(self))
         if self.take == Take.WHOLE:
             del said["take"]
@@ -90,14 +89,14 @@ class JobHead:
     blend: str
     scene: str
     view_layer: str
-    settings: Mapping[str, Any]
+    settings: Mapping[str, object]
     frames: tuple[int, ...]
     tiles: int
     seeds: int
     subframe: float = 0.0
     catchers: tuple[int, ...] = ()
     blender: str = ""
-    others: Mapping[str, Any] = field(default_factory=dict)
+    others: Mapping[str, object] = field(default_factory=dict)
 
     @staticmethod
     def read(said: Values) -> JobHead:
@@ -128,7 +127,7 @@ class JobHead:
             raise said.wrong("tiles", head.tiles)
         return head
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """What `read` reads, in the order in which files have it."""
         return {
             "format": FORMAT,
@@ -189,7 +188,7 @@ class PartHead:
     samples: int
     files: tuple[str, ...]
     seconds: float = 0.0
-    fitted: Mapping[str, Any] | None = None
+    fitted: Mapping[str, object] | None = None
     sums: Mapping[str, int] = field(default_factory=dict)
 
     @staticmethod
@@ -211,9 +210,9 @@ class PartHead:
             sums=checked_sums(said),
         )
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """What `read` reads, in the order in which files have it."""
-        said: dict[str, Any] = {
+        said: dict[str, object] = {
             "part": self.part.to_json(),
             "key": self.key,
             "samples": self.samples,

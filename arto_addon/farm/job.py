@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import bpy
 
@@ -133,7 +132,7 @@ def set_folder(folder: Path, frame: int, take: Take) -> Path:
     return folder / (f"frame_{frame:04d}" + (f"_{take}" if take else ""))
 
 
-def _set(scene: bpy.types.Scene, settings: Mapping[str, Any]) -> None:
+def _set(scene: bpy.types.Scene, settings: Mapping[str, object]) -> None:
     for name in settings:
         if name not in scene.arto.bl_rna.properties:
             raise FarmError(f"this ARTO has no setting '{name}': use the one that planned")
@@ -150,7 +149,7 @@ def estimate(head: CaptureHead, fitted: bool) -> Estimate:
     return room.estimate(images, tiles, len(head.hemicube), fitted)
 
 
-def settings_of(scene: bpy.types.Scene) -> dict[str, Any]:
+def settings_of(scene: bpy.types.Scene) -> dict[str, object]:
     """The settings of a scene that a farm's job carries."""
     found = {}
     for name in FARM:

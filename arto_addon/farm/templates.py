@@ -6,7 +6,6 @@ import json
 import os
 import shlex
 from pathlib import Path
-from typing import Any
 
 from ...core.description import MOST_BYTES
 from ...core.errors import FarmError
@@ -44,10 +43,10 @@ def check(folder: Path) -> None:
             raise FarmError(f"{path} was not written by ARTO: plan into another folder")
 
 
-def openjd(job: Job) -> dict[str, Any]:
+def openjd(job: Job) -> dict[str, object]:
     """A job template by the Open Job Description of 2023-09: render parts, then gather."""
 
-    def run(*verb: str) -> dict[str, Any]:
+    def run(*verb: str) -> dict[str, object]:
         start = [*QUIET, "{{Param.Addon}}", "{{Param.Blend}}", "--command", "arto"]
         arguments = [*start, *verb, "--job", "{{Param.Job}}", "--openjd"]
         action = {"command": "{{Param.Blender}}", "args": arguments}

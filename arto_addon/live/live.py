@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -46,6 +46,35 @@ ANYWAY = 0.5
 WHOLE, FINISHED = 0.25, 2.0
 
 
+@dataclass(frozen=True)
+class _Light:
+    """The light that a live picture is to show.
+
+    key: what the world shows, apart from its strength and turn; own: how much of the scene's own
+    lamps; gains: by their light groups.
+    """
+
+    key: str
+    strength: float
+    turn: float
+    own: float
+    gains: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
+class _Wished:
+    """The picture that was asked for last.
+
+    key: the world's; light: None where the map is of a world that has changed since; image: the
+    identity of the map; whole: whether the picture has full size.
+    """
+
+    key: str
+    light: _Light | None = None
+    image: int = 0
+    whole: bool = False
+
+
 class Live:
     """A shot that follows its world."""
 
@@ -75,11 +104,11 @@ class Live:
         self.line = "Starting"
         self.dirty = True
         self._looked = 0.0
-        self._now: tuple[Any, ...] = ()
+        self._now: _Light | None = None
         self._changed = 0.0
-        self._wished: tuple[Any, ...] = ()
+        self._wished: _Wished | None = None
         self._asked_with = 1.0, 0.0
-        self._finished: tuple[Any, ...] = ()
+        self._finished: _Light | None = None
         self.relighting = False
         self.revealed = False
         self.maps.start()
@@ -118,14 +147,14 @@ class Live:
             if self.later:
                 self.line += f"; {self.later} comes when it is finished"
             redraw_pictures()
-        said = self.maps.trouble_with(self._now[0])
+        said = self.maps.trouble_with(self._now.key) if self._now else ""
         self.trouble = self.problem or said or self.viewer.trouble
         if self._place(scene) != self._shot:
             self.trouble = "Live shows the shot that it was switched on for: this is another one"
         return True
 
     @staticmethod
-    def _place(scene: bpy.types.Scene) -> tuple[Any, ...]:
+    def _place(scene: bpy.types.Scene) -> tuple[int, float, str, int, int]:
         """What tells this shot from other shots of the scene: frame, camera and picture size."""
         camera = scene.camera.name if scene.camera else ""
         return scene.frame_current, scene.frame_subframe, camera, *picture_size(scene)
@@ -142,8 +171,8 @@ class Live:
         if world is None:
             raise SceneError("the scene has no world any more: add one, and switch Live on again")
         key, strength, turn = shows(scene, world)
-        settings = scene.arto
-        found = (key, strength, turn, settings.own_lamps, tuple(gains_of(settings).items()))
+        gains = tuple(gains_of(scene).items())
+        found = _Light(key, strength, turn, scene.arto.own_lamps, gains)
         if found != self._now:
             self._now, self._changed = found, now
             if self.relighting and session.current and session.current.verb == "relight":
@@ -151,7 +180,10 @@ class Live:
             self.relighting = False
 
     def _wish(self, scene: bpy.types.Scene, now: float) -> None:
-        key, strength, turn, own, _ = self._now
+        light = self._now
+        if light is None:
+            return
+        key, strength, turn = light.key, light.strength, light.turn
         rest = now - self._changed
         world = world_of(scene, self.layer)
         full = self.maps.get(key, True)
@@ -168,24 +200,22 @@ class Live:
         if image is None:
             # the artist changes the world faster than maps are made: show the newest map meanwhile
             newest = self.maps.newest
-            if newest is None or self._wished[:1] == (newest[0],):
+            if newest is None or (self._wished and self._wished.key == newest[0]):
                 return
             image = newest[1]
             strength, turn = self._asked_with
-            wished: tuple[Any, ...] = (newest[0],)
-            resting = False
+            wished = _Wished(newest[0])
         else:
-            resting = rest > WHOLE and full is not None
-            wished = (*self._now, id(image), resting)
+            wished = _Wished(key, light, id(image), rest > WHOLE and full is not None)
         if wished != self._wished:
             self._wished = wished
-            gains = gains_of(scene.arto)
+            gains = gains_of(scene)
             view = None
             if not scene.render.film_transparent:
                 view = view_of(scene, self.shape, self.region)
                 if view is None:
                     self.later = "the world behind"
-            self.viewer.wish(Wish(image, strength, turn, own, gains, resting, view))
+            self.viewer.wish(Wish(image, strength, turn, light.own, gains, wished.whole, view))
         if rest > FINISHED and self.settled and scene.arto.live_finish:
             self._finish(scene)
 
@@ -193,7 +223,9 @@ class Live:
     def settled(self) -> bool:
         """Whether the picture of full size, of the world as it is now, is shown."""
         wished = self._wished
-        return wished[:-2] == self._now and wished[-1:] == (True,) and self.viewer.idle
+        if wished is None or wished.light is None:
+            return False
+        return wished.light == self._now and wished.whole and self.viewer.idle
 
     def _finish(self, scene: bpy.types.Scene) -> None:
         """Start the relight of the light that is shown, once for each light."""
@@ -277,7 +309,7 @@ def _changed(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 def _undone(*_: object) -> None:
     """Have the live image made and shown again: an undo removes it."""
     if current is not None:
-        current.dirty, current.revealed, current._wished = True, False, ()
+        current.dirty, current.revealed, current._wished = True, False, None
 
 
 @persistent

@@ -10,7 +10,6 @@ import contextlib
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -40,8 +39,8 @@ class Footage:
     is seen when, or None; fills: how the footage fills the frame, a key of `_FILLS`.
     """
 
-    source: Any
-    timing: Any = None
+    source: bpy.types.Image | bpy.types.MovieClip
+    timing: bpy.types.ImageUser | bpy.types.Node | _Timing | None = None
     fills: str = "STRETCH"
 
     @property
@@ -242,7 +241,7 @@ def _size(box: Box) -> tuple[int, int]:
     return box[2] - box[0] + 1, box[3] - box[1] + 1
 
 
-def _pixels(source: Any, file: Path | None) -> tuple[int, int]:
+def _pixels(source: bpy.types.Image | bpy.types.MovieClip, file: Path | None) -> tuple[int, int]:
     """The width and height of an image or clip; where Blender does not know them, of the file."""
     if min(source.size) or file is None or not file.is_file():
         return tuple(source.size)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -197,7 +196,7 @@ def show(path: Path, name: str = IMAGE) -> bpy.types.Image:
 
 def node_group(
     image: bpy.types.Image, name: str = IMAGE, share: bpy.types.Image | None = None
-) -> Any:
+) -> bpy.types.NodeTree:
     """Make or update the compositor's node group that shows a plate.
 
     share: for a plate with shadow catchers, the image of how much of the footage is seen. The group
@@ -222,7 +221,9 @@ def node_group(
     return tree
 
 
-def add_footage(tree: bpy.types.NodeTree, things: Any, share: bpy.types.Image) -> None:
+def add_footage(
+    tree: bpy.types.NodeTree, things: bpy.types.NodeSocket, share: bpy.types.Image
+) -> None:
     """Have a plate's node group put the things into footage; a group that does so is updated.
 
     The group gets an input for the footage, and an output for the composite. things: the socket

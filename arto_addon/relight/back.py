@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -123,7 +122,7 @@ def _check_lamps(scene: bpy.types.Scene, mix: Mix) -> None:
 
 def _gain_lamps(scene: bpy.types.Scene, mix: Mix) -> None:
     """Multiply the scene's lamps by their layers' gains."""
-    gained: dict[str, dict[Any, NDArray]] = {}
+    gained: dict[str, dict[bpy.types.Light, NDArray]] = {}
     for thing in _lamps(scene):
         if thing.data.library:
             continue  # a linked lamp stays as it is: `_check_lamps` has found its gain to be 1

@@ -156,7 +156,7 @@ def of_plate(shot: Shown, ready: Ready) -> Steps[dict[str, NDArray[np.float32]]]
     own = field.layer("own")
     if scene.arto.own_lamps and own.any():
         left, scale = own, np.float32(scene.arto.own_lamps)
-        gains = gains_of(scene.arto)
+        gains = gains_of(scene)
         for name in field.own_layers:
             gain = np.float32(gains.get(name.removeprefix("own_"), 1.0))
             found[name] = scale * gain * field.layer(name)

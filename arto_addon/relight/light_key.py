@@ -54,7 +54,7 @@ def light_key(
     of: list[object] = [key, round(strength, 5), round(turn, 5), scene.render.film_transparent]
     of.append(scene.cycles.film_transparent_glass)
     of += [str(value) for value in values(settings, Decides.PLATE).values()]
-    of += [sorted((n, round(g, 5)) for n, g in gains_of(settings).items())]
+    of += [sorted((n, round(g, 5)) for n, g in gains_of(scene).items())]
     of += [_shot(scene, layer), _field(field), _footage(scene), _groups(scene)]
     rendered = mattes.file_of(scene, field) if field else None
     of.append(_content(rendered) if rendered else None)

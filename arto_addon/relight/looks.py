@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import bpy
 
@@ -18,7 +17,7 @@ from .relight import finish, make_ready
 from .shown import Light, Ready, Shown
 
 
-def add(scene: bpy.types.Scene, name: str = "") -> Any:
+def add(scene: bpy.types.Scene, name: str = "") -> bpy.types.ArtoLook:
     """Keep the light as it is now as a new look, and show the look.
 
     The first look takes the scene's world. Later looks take a copy of the world, so that no two
@@ -66,7 +65,7 @@ def show(scene: bpy.types.Scene) -> None:
         scene.world = look.world
 
 
-def named(scene: bpy.types.Scene, look: Any) -> None:
+def named(scene: bpy.types.Scene, look: bpy.types.ArtoLook) -> None:
     """Follow a look's new name: make the name unique, and name the plate if the look is shown."""
     settings = scene.arto
     others = {k.name for k in settings.looks if k != look}

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Literal
+from typing import Literal
 
 # What a setting holds. choice: one of the setting's items; choices: any number of the items; image:
 # an image of the .blend; list: entries that are made in the panels, see `ui.lists`.
@@ -101,7 +101,7 @@ class Setting:
     kind: Kind
     title: str = ""
     words: str = ""
-    default: Any = None
+    default: bool | float | str | tuple[str, ...] | None = None
     work: Work
     decides: Decides
     farm: bool

@@ -57,7 +57,7 @@ def in_panel(panel: Panel, work: Work) -> tuple[str, ...]:
     return tuple(s.name for s in SETTINGS if panel in s.panels and s.work == work)
 
 
-def values(of: Any, decides: Decides) -> dict[str, Any]:
+def values(of: object, decides: Decides) -> dict[str, Any]:
     """Read the values of all settings whose `decides` is the given one.
 
     Parameters

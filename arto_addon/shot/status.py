@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Generic, TypeVar
 
 import bpy
 
@@ -20,27 +20,39 @@ from .fingerprint import changes
 from .paths import Place
 from .shot import check_same_shot, layer_of
 
-# A panel is drawn with every move of the mouse, so a description is read only when its file has
-# changed. By the description's path: the time of the file, and what the description describes.
-_read: dict[Path, tuple[int, CaptureSet | Field | None]] = {}
-
 Line = tuple[str, bool]  # What to say, and whether the files can be used for the shot as it is now.
 
 
-def _opened(kind: type, path: Path, **options: Any) -> Any:
-    """Open a capture set or field by the path of its description.
+_Opened = TypeVar("_Opened", CaptureSet, Field)
 
-    None where the description is damaged or of another version. Raises OSError where it is not
-    there.
+
+class _Kept(Generic[_Opened]):
+    """What was opened, by the path of its description.
+
+    A panel is drawn with every move of the mouse, so a description is read only when its file has
+    changed.
     """
-    changed = path.stat().st_mtime_ns
-    if path not in _read or _read[path][0] != changed:
-        try:
-            found = kind(path.parent, **options)
-        except ArtoError:
-            found = None
-        _read[path] = (changed, found)
-    return _read[path][1]
+
+    def __init__(self, opened: Callable[[Path], _Opened]) -> None:
+        self._opened = opened
+        # With the time of the file.
+        self._read: dict[Path, tuple[int, _Opened | None]] = {}
+
+    def get(self, path: Path) -> _Opened | None:
+        """None where the description is damaged or of another version. Raises OSError where it is
+        not there."""
+        changed = path.stat().st_mtime_ns
+        if path not in self._read or self._read[path][0] != changed:
+            try:
+                found = self._opened(path.parent)
+            except ArtoError:
+                found = None
+            self._read[path] = (changed, found)
+        return self._read[path][1]
+
+
+_captures = _Kept(lambda folder: CaptureSet(folder, unfinished=True))
+_fields = _Kept(Field)
 
 
 def _place(scene: bpy.types.Scene, view_layer: str | None) -> Place | None:
@@ -55,7 +67,7 @@ def unfinished(folder: Path) -> list[str]:
     found = []
     for path in folder.glob("unfinished-*/" + HEADER):
         try:
-            there = _opened(CaptureSet, path, unfinished=True)
+            there = _captures.get(path)
         except OSError:
             continue
         if there:
@@ -109,7 +121,7 @@ def caution_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line 
 
 def _capture_set(place: Place) -> CaptureSet | Line | None:
     try:
-        there = _opened(CaptureSet, place.source / "capture" / HEADER, unfinished=True)
+        there = _captures.get(place.source / "capture" / HEADER)
     except OSError:
         return None
     return there or ("damaged, or of another version: capture again", False)
@@ -118,7 +130,7 @@ def _capture_set(place: Place) -> CaptureSet | Line | None:
 def capture_at(header: Path) -> CaptureSet | None:
     """Open the capture set with this description; None where it is missing or damaged."""
     try:
-        return _opened(CaptureSet, header, unfinished=True)
+        return _captures.get(header)
     except OSError:
         return None
 
@@ -126,7 +138,7 @@ def capture_at(header: Path) -> CaptureSet | None:
 def field_of(source: Path) -> Field | None:
     """Open the field in a shot's folder; None where it is missing or damaged."""
     try:
-        return _opened(Field, source / "field" / FIELD_HEADER)
+        return _fields.get(source / "field" / FIELD_HEADER)
     except OSError:
         return None
 
@@ -150,7 +162,7 @@ def field_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line | 
         return None
     try:
         path = place.source / "field" / FIELD_HEADER
-        there: Field | None = _opened(Field, path)
+        there = _fields.get(path)
     except OSError:
         return None
     if there is None:

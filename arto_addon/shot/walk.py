@@ -100,7 +100,7 @@ class Walk:
     def _put(self, *values: object) -> None:
         self._hash.update(repr(values).encode("utf-8", "surrogatepass"))
 
-    def _struct(self, value: Any, depth: int) -> None:
+    def _struct(self, value: bpy.types.bpy_struct, depth: int) -> None:
         # A socket points to its node, and the node to its sockets. So each is read only once.
         key = value.as_pointer(), type(value)
         if key in self._seen:
@@ -128,7 +128,7 @@ class Walk:
         if not isinstance(value, bpy.types.ID) or isinstance(value, _CUSTOM):
             self._custom(value)
 
-    def _custom(self, value: Any) -> None:
+    def _custom(self, value: bpy.types.bpy_struct) -> None:
         """Read custom properties, as drivers, Attribute nodes and modifiers depend on them."""
         try:
             names = sorted(value.keys())
@@ -149,7 +149,7 @@ class Walk:
             elif hasattr(item, "to_dict"):
                 self._put(name, sorted(item.to_dict()))
 
-    def _pointer(self, name: str, item: Any, depth: int) -> None:
+    def _pointer(self, name: str, item: bpy.types.bpy_struct | None, depth: int) -> None:
         if item is None:
             return
         embedded = isinstance(item, bpy.types.ID) and item.is_embedded_data
@@ -162,7 +162,7 @@ class Walk:
             self._put(name)
             self._struct(item, depth + 1)
 
-    def _collection(self, name: str, value: Any, depth: int) -> None:
+    def _collection(self, name: str, value: bpy.types.bpy_struct, depth: int) -> None:
         if name in _ARRAYS and isinstance(value, _ARRAY_OWNERS):
             return
         if depth >= _DEPTH:
@@ -180,11 +180,11 @@ class Walk:
                 self._struct(item, depth + 1)
 
 
-def _plain(item: Any) -> Any:
+def _plain(item: Any) -> object:
     return [_plain(i) for i in item] if isinstance(item, bpy.types.bpy_prop_array) else item
 
 
-def _flat(item: Any) -> Iterator[float]:
+def _flat(item: bpy.types.bpy_prop_array) -> Iterator[float]:
     for x in item:
         if isinstance(x, float | int):
             yield x
@@ -195,7 +195,7 @@ def _flat(item: Any) -> Iterator[float]:
 _kept: dict[type, list[tuple[str, str, bool]]] = {}
 
 
-def _properties(kind: type, rna: Any) -> list[tuple[str, str, bool]]:
+def _properties(kind: type, rna: bpy.types.Struct) -> list[tuple[str, str, bool]]:
     """List the properties of a type that may change a picture: (name, kind, whether an array)."""
     if kind not in _kept:
         out = []
@@ -222,7 +222,7 @@ def checksum(values: np.ndarray) -> bytes:
     return zlib.crc32(values).to_bytes(4, "little")
 
 
-def arrays(data: Any) -> str:
+def arrays(data: bpy.types.ID) -> str:
     """The digest of the arrays of a mesh, hair curves or a point cloud."""
     out = hashlib.blake2b(digest_size=12)
     for attribute in data.attributes:

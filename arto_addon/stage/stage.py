@@ -11,7 +11,7 @@ import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeVar
 
 import bpy
 import numpy as np
@@ -37,6 +37,9 @@ class Pace:
     layer: float
 
 
+_Block = TypeVar("_Block", bound=bpy.types.ID)
+
+
 class Stage:
     """The copied scene, and the data-blocks that are removed with the scene."""
 
@@ -47,7 +50,7 @@ class Stage:
         self.own_groups: list[str] = []  # The artist's light groups that have objects.
         self._made: list[bpy.types.ID] = []
 
-    def made(self, block: Any) -> Any:
+    def made(self, block: _Block) -> _Block:
         """Note a new data-block, so that it goes when the stage goes."""
         self._made.append(block)
         return block
@@ -61,7 +64,7 @@ class Stage:
     def change(self, path: str, value: object) -> None:
         """Set `scene.<path>`, and note old and new value for the capture set's description."""
         *owners, name = path.split(".")
-        target: Any = self.scene
+        target: bpy.types.bpy_struct = self.scene
         for owner in owners:
             target = getattr(target, owner)
         before = getattr(target, name)

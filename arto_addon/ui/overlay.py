@@ -7,7 +7,6 @@ captured patches are a thousand radii away, too far to be seen.
 from __future__ import annotations
 
 import contextlib
-from typing import Any
 
 import bpy
 import numpy as np
@@ -25,8 +24,9 @@ from ..shot.shot import layer_of
 from ..world import kept
 from ..world.check import world_of
 
-_handle: list[Any] = []
-_drawn: dict[str, Any] = {}
+_handle: list[object] = []
+# The light that was drawn last.
+_drawn: list[tuple[str, float, float]] = []
 # What makes maps of the world while Live is off: none or one.
 _maps: list[Maps] = []
 # Seconds between looks at the world.
@@ -71,8 +71,8 @@ def _follow() -> float | None:
     if world is None:
         return EVERY
     key = kept.shows(scene, world)
-    if key != _drawn.get("key") and map_of(scene) is not None:
-        _drawn["key"] = key
+    if [key] != _drawn and map_of(scene) is not None:
+        _drawn[:] = [key]
         _redraw()
     elif live.current is None and map_of(scene) is None:
         if not _maps:

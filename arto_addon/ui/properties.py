@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import bpy
 from bpy.props import (
     BoolProperty,
@@ -75,12 +73,12 @@ _PROPERTIES = {
 }
 
 
-def _property(setting: Setting) -> Any:
+def _property(setting: Setting) -> object:
     """Make Blender's property for a setting."""
-    facts: dict[str, Any] = {
+    facts: dict[str, object] = {
         "name": setting.title,
         "description": setting.words,
-        "default": setting.default,
+        "default": set(setting.default) if isinstance(setting.default, tuple) else setting.default,
         "min": setting.least,
         "max": setting.most,
         "soft_min": setting.soft_least,
@@ -93,7 +91,6 @@ def _property(setting: Setting) -> Any:
     elif setting.kind == "choices":
         facts["items"] = [(*item, 1 << i) for i, item in enumerate(setting.items)]
         facts["options"] = {"ENUM_FLAG"}
-        facts["default"] = set(setting.default)
     elif setting.kind == "image":
         facts["type"] = bpy.types.Image
     elif setting.kind == "list":

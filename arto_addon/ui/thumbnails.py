@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import bpy
 import bpy.utils.previews
@@ -14,7 +13,7 @@ from ...core import exr
 from ...core.errors import ArtoError
 
 WIDTH = 192
-_pictures: list[Any] = []
+_pictures: list[bpy.utils.previews.ImagePreviewCollection] = []
 _written: dict[str, int] = {}
 
 

@@ -104,7 +104,7 @@ def _before_save(*_: object) -> None:
     if not snapshot.taking:
         put_away(name_of(bpy.context.scene), *OURS)
         if live.current is not None:
-            live.current._wished = ()
+            live.current._wished = None
 
 
 _FINISHERS: dict[Verb, Callable[[SecondBlender], str]] = {

@@ -9,8 +9,8 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -36,7 +36,18 @@ VERSION = 2
 MOST = 12
 # The last map also stays in memory up to so many bytes, as a turntable needs only this map.
 LAST = 1 << 27
-_last: dict[str, Any] = {}
+
+
+@dataclass(frozen=True)
+class _Last:
+    """A map in memory, with the strength of its world."""
+
+    path: Path
+    strength: float
+    image: np.ndarray
+
+
+_last: list[_Last] = []
 
 
 def environment(
@@ -53,8 +64,9 @@ def environment(
     layer = view_layer or layer_of(scene)
     with without_dials(scene, layer, world) as (plain, strength, turn):
         path = paths.worlds_folder(scene) / f"{_key(scene, plain, width)}.npy"
-        if _last.get("key") == (path, strength):
-            return Environment(_last["image"], turn)
+        for last in _last:
+            if (last.path, last.strength) == (path, strength):
+                return Environment(last.image, turn)
         image = _read(path, width)
         if image is None:
             image = bake(scene, width, layer, plain).image
@@ -62,7 +74,7 @@ def environment(
     image = image * np.float32(strength)
     _last.clear()
     if image.nbytes <= LAST:
-        _last.update(key=(path, strength), image=image)
+        _last.append(_Last(path, strength, image))
     return Environment(image, turn)
 
 

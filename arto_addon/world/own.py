@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +10,14 @@ from ...core.field.field import Field
 from ...core.preview import own_light
 
 
-def gains_of(settings: Any) -> dict[str, float]:
+def gains_of(scene: bpy.types.Scene) -> dict[str, float]:
     """The gain of each light group of the scene's own lamps, by name; 0 for a hidden group."""
-    return {group.name: group.gain if group.show else 0.0 for group in settings.own_groups}
+    return {group.name: group.gain if group.show else 0.0 for group in scene.arto.own_groups}
 
 
 def own_of(scene: bpy.types.Scene, field: Field) -> NDArray[np.float32]:
     """The light of the scene's own lamps in a field, with the settings' gains -> (H, W, 3)."""
-    return own_light(field, scene.arto.own_lamps, gains_of(scene.arto))
+    return own_light(field, scene.arto.own_lamps, gains_of(scene))
 
 
 def sync(scene: bpy.types.Scene, field: Field) -> None:
