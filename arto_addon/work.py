@@ -8,7 +8,7 @@ cleans up in its own `finally`, however the work ends.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -174,6 +174,17 @@ def strictly(steps: Steps[_Made]) -> Steps[_Made]:
     return retold(steps, change)
 
 
+def of_piece(steps: Steps[_Made], name: str) -> Steps[_Made]:
+    """Pass on the steps of one of many pieces of work, and say of which its warnings are."""
+
+    def change(step: Progress | Render) -> Progress | Render:
+        if isinstance(step, Warned):
+            step.of = step.of or name
+        return step
+
+    return retold(steps, change)
+
+
 def of_one(steps: Steps[_Made], name: str, share: float) -> Steps[_Made]:
     """Run one of many similar pieces of work without its progress, which would be lost among many.
 
@@ -182,14 +193,12 @@ def of_one(steps: Steps[_Made], name: str, share: float) -> Steps[_Made]:
     """
 
     def change(step: Progress | Render) -> Progress | Render | None:
-        if isinstance(step, Warned):
-            step.of = step.of or name
-        elif isinstance(step, Progress) and not isinstance(step, Wrote | Failed):
+        if isinstance(step, Progress) and not isinstance(step, Warned | Wrote | Failed):
             return None
         step.share = share
         return step
 
-    return retold(steps, change)
+    return of_piece(retold(steps, change), name)
 
 
 @dataclass(frozen=True)
@@ -215,17 +224,48 @@ def failed(names: Iterable[str], error: ArtoError, share: float, batch: Batch) -
         yield Failed(share, f"{name} failed: {error}", name, error)
 
 
-def tried(steps: Steps[_Made], name: str, share: float, batch: Batch) -> Steps[_Made | None]:
-    """Do one of many similar pieces of work, see `of_one` -> what it returns; None if it failed.
+def attempted(steps: Steps[_Made], name: str, share: float, batch: Batch) -> Steps[_Made | None]:
+    """Do a piece of work of many -> what it returns; None if it failed.
 
-    Raises the piece's error, unless the batch keeps going.
+    name: of the piece; share: how much of the whole work is done before it. Raises the piece's
+    error, unless the batch keeps going.
     """
-    steps = of_one(steps, name, share)
     try:
         return (yield from strictly(steps) if batch.strict else steps)
     except ArtoError as e:
         yield from failed([name], e, share, batch)
         return None
+
+
+def tried(steps: Steps[_Made], name: str, share: float, batch: Batch) -> Steps[_Made | None]:
+    """Do one of many similar pieces of work as `attempted` does, without its progress: `of_one`."""
+    return (yield from attempted(of_one(steps, name, share), name, share, batch))
+
+
+def looked(
+    wrong: Mapping[str, ArtoError], total: int, what: str, batch: Batch
+) -> Generator[Failed, None, None]:
+    """Tell what is wrong with some of many pieces of work, before the first of them is begun.
+
+    wrong: errors by the names of the pieces; total: how many pieces there are; what: the pieces in
+    words. Raises an error that names all that is wrong, unless the batch keeps going and there are
+    other pieces.
+    """
+    for name, error in wrong.items():
+        yield Failed(0.0, f"{name} cannot be made: {error}", name, error)
+    if not wrong or (batch.keep_going and len(wrong) < total):
+        return
+    first = next(iter(wrong.values()))
+    if len(set(map(str, wrong.values()))) == 1:
+        raise first
+    said = [f"{name}: {error}" for name, error in wrong.items()]
+    more = f"\n  and {len(said) - 10} more" if len(said) > 10 else ""
+    lines = "\n  ".join(said[:10])
+    others = " (--keep-going makes the others)" if len(wrong) < total else ""
+    raise type(first)(
+        f"{len(wrong)} of {total} {what} cannot be made, so none was begun{others}:"
+        f"\n  {lines}{more}"
+    ) from first
 
 
 def run(steps: Steps[_Made], say: Callable[[Progress | Render], None] | None = None) -> _Made:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -13,12 +13,11 @@ import bpy
 from ...core import exr
 from ...core.capture import head as heads
 from ...core.capture.head import CaptureHead
-from ...core.capture.kinds import Keep, Route, Take
+from ...core.capture.kinds import Route, Take
 from ...core.capture.names import GRAIN, GROUP, group_name
 from ...core.capture.tile_entry import sums_of
 from ...core.errors import ArtoError, CaptureSetError
 from ...core.files import Lock, whole
-from ...core.fit.choice import check as check_choice
 from ..blender.output import write_to
 from ..fit.guides import cleaned
 from ..shot import paths
@@ -28,8 +27,7 @@ from ..stage.stage import Stage, set_region
 from ..work import Progress, Render, Steps, Warned, Wrote
 from . import beside, planes
 from .asked import Asked, asked, begun
-from .check import check_scene
-from .patterns import patterns_of
+from .check import check_patterns, check_scene
 from .plan import render_plan
 from .planned import Given, Planned
 from .resume import empty, empty_take, finish, finish_field, let_go, unfinished
@@ -55,6 +53,7 @@ def capture(
     scene: bpy.types.Scene,
     view_layer: str,
     given: Given | None = None,
+    together: Sequence[int] = (),
 ) -> Steps[Path]:
     """Render the basis images of a scene into its capture set; returns the folder.
 
@@ -64,11 +63,13 @@ def capture(
     other settings. The scene does not change, except that it may be given the ID that its shots are
     found by.
 
-    given: see `Given`. Raises SceneError, CaptureSetError, FieldError, PatternError, BusyError
-    (another process captures this shot), ExrError, CancelledError.
+    given: see `Given`; together: the frames of the sequence that this one is of. A frame of a
+    sequence that is there already, just as it would be captured, is not captured again. Raises
+    SceneError, CaptureSetError, FieldError, PatternError, BusyError (another process captures this
+    shot), ExrError, CancelledError.
     """
-    with _claimed(scene, view_layer) as place:
-        return (yield from _capture(scene, view_layer, place, given))
+    with _claimed(scene, view_layer, together) as place:
+        return (yield from _capture(scene, view_layer, place, given, bool(together)))
 
 
 def estimate(scene: bpy.types.Scene, view_layer: str) -> Steps[Estimate]:
@@ -82,14 +83,15 @@ def estimate(scene: bpy.types.Scene, view_layer: str) -> Steps[Estimate]:
 
 
 @contextmanager
-def _claimed(scene: bpy.types.Scene, view_layer: str) -> Iterator[Path]:
+def _claimed(
+    scene: bpy.types.Scene, view_layer: str, together: Sequence[int] = ()
+) -> Iterator[Path]:
     """Check the scene, and hold the lock of its shot's own folder -> the folder."""
     check_scene(scene, view_layer)
     # let the scene follow what a script has moved
     scene.view_layers[view_layer].update()
-    if scene.arto.keep == Keep.NEVER:
-        check_choice(scene.arto.support, patterns_of(scene.arto), scene.arto.separate)
-    claimed = paths.claim(scene, view_layer)
+    check_patterns(scene)
+    claimed = paths.claim(scene, view_layer, together)
     with Lock(claimed, f"capturing {shot_of(scene, view_layer).title}"):
         yield claimed
 
@@ -99,10 +101,14 @@ def _capture(
     view_layer: str,
     claimed: Path,
     given: Given | None,
+    of_sequence: bool,
 ) -> Steps[Path]:
     with asked(scene, view_layer, given) as this:
         folder = paths.unfinished_folder(claimed, this.key)
         head = unfinished(folder, this.key)
+        if of_sequence and head is None and beside.is_whole(claimed, this.key, this.catchers):
+            yield Wrote(1.0, "it is there already", claimed / "capture")
+            return claimed / "capture"
         stopped = head is not None
         if head and head.caution:
             yield Warned(0.0, f"CAUTION: {head.caution.text}")

@@ -2,15 +2,48 @@
 
 from __future__ import annotations
 
+import os
+
 import bpy
 
-from ...core.errors import SceneError
+from ...core.capture.kinds import Keep
+from ...core.errors import BusyError, SceneError
+from ...core.files import Lock
+from ...core.fit.choice import check as check_choice
+from ..shot import paths
 from ..stage.stage import picture_size
 from ..world.check import check_light_of, world_of
+from .patterns import patterns_of
 from .simulations import unbaked
 
 # The fewest pixels on a side that Blender renders, with denoising and the world behind.
 LEAST_PIXELS = 4
+
+
+def check_patterns(scene: bpy.types.Scene) -> None:
+    """Raise PatternError where a capture whose images do not stay cannot be fitted as asked."""
+    settings = scene.arto
+    if settings.keep == Keep.NEVER:
+        check_choice(settings.support, patterns_of(settings), settings.separate)
+
+
+def check_place(scene: bpy.types.Scene, view_layer: str) -> None:
+    """Look at the shot's folder, and write nothing.
+
+    Raises SceneError where nothing can be written there; BusyError where another process works on
+    the shot.
+    """
+    folder = paths.place(scene, view_layer).folder
+    if holder := Lock.holder(folder):
+        raise BusyError(f"{folder} is in use: {holder}; wait until it is done, or end it there")
+    there = folder
+    while not os.path.lexists(there) and there != there.parent:
+        there = there.parent
+    if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
+        raise SceneError(
+            f"nothing can be written into {folder}: see who may write there, or choose another "
+            "folder in ARTO's settings"
+        )
 
 
 def check_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> None:

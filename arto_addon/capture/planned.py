@@ -131,6 +131,23 @@ def light_route(on: Stage, hemicube: Hemicube) -> Steps[tuple[Route, Caution | N
     return (Route.SAMPLED if sampled else Route(settings.route)), caution
 
 
+def room_for(scene: bpy.types.Scene, given: Given) -> Estimate:
+    """What a capture with given patches takes, before anything of it is rendered."""
+    settings = scene.arto
+    grain = settings.grain and given.route == Route.ALL
+    names = [*patterns_of(settings, given.route).patterns, *([GRAIN] if grain else [])]
+    plan = [len(images) for images in render_plan(given.route, given.hemicube, names)]
+
+    def estimated(fitted: bool) -> Estimate:
+        bytes_a_pixel = room.bytes_a_pixel(max(plan), len(given.hemicube), fitted)
+        tiles = tiles_of(picture_region(scene), bytes_a_pixel, room.budget(settings.memory))
+        return room.estimate(plan, tiles, len(given.hemicube), fitted)
+
+    found = estimated(settings.keep == Keep.NEVER)
+    too_large = settings.keep == Keep.FITS and found.kept > settings.keep_limit * 1e9
+    return estimated(True) if too_large else found
+
+
 def most(scene: bpy.types.Scene) -> Estimate:
     """What a capture may take at most, without a look at the scene.
 

@@ -17,17 +17,18 @@ import numpy as np
 from ...core.capture.kinds import Route
 from ...core.capture.refine import check as can_refine
 from ...core.capture.refine import refine
-from ...core.errors import SceneError
+from ...core.errors import ArtoError, SceneError
+from ..shot import paths
 from ..stage.bounds import Rendered, rendered
 from ..stage.settings import prepare
 from ..stage.stage import stage
-from ..stage.takes import WHOLE, take
-from ..work import Progress, Steps, part_of
-from . import planes, probe
+from ..stage.takes import TAKES, WHOLE, take
+from ..work import PLAIN, Batch, Progress, Steps, attempted, looked, of_piece, part_of, strictly
+from . import planes, probe, room
 from .capture import capture
-from .check import check_scene
+from .check import check_patterns, check_place, check_scene
 from .patterns import patterns_of
-from .planned import ADAPTIVE_SHARE, Given, light_route
+from .planned import ADAPTIVE_SHARE, Given, light_route, room_for
 
 
 @contextmanager
@@ -41,25 +42,71 @@ def frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
 
 
 def capture_frames(
-    scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]
+    scene: bpy.types.Scene, view_layer: str, frames: Sequence[int], batch: Batch = PLAIN
 ) -> Steps[list[Path]]:
-    """Capture some frames of a shot, each with its field; returns their folders.
+    """Capture some frames of a shot, each with its field; returns the folders of those captured.
 
-    Finished frames are captured again; a frame that was stopped goes on (`capture`). The scene is
-    put back to its frame. Raises what `capture` raises, and SceneError without frames.
+    All frames are looked at first. Frames that are there already, just as they would be captured,
+    are passed by, and a frame that was stopped goes on (`capture`). batch: what a failure and a
+    warning mean. The scene is put back to its frame. Raises what `capture` raises, and SceneError
+    without frames.
     """
     if not frames:
         raise SceneError("there are no frames to capture: give a first and a last one")
     folders: list[Path] = []
-    one = 1 / len(frames)
     with frame_kept(scene):
-        given = yield from together(scene, view_layer, frames)
+        wrong = yield from look(scene, view_layer, frames)
+        named = {f"frame {frame}": error for frame, error in wrong.items()}
+        yield from looked(named, len(frames), "frames", batch)
+        frames = [frame for frame in frames if frame not in wrong]
+        steps = together(scene, view_layer, frames)
+        given = yield from strictly(steps) if batch.strict else steps
+        _check_room(scene, view_layer, given, frames)
+        one = 1 / len(frames)
         for i, frame in enumerate(frames):
             scene.frame_set(frame)
-            steps = capture(scene, view_layer, given=given)
-            folders.append((yield from part_of(steps, i * one, one, f"frame {frame}: ")))
-    yield Progress(1.0, f"captured {len(frames)} frames, {len(given.hemicube)} patches each")
+            name = f"frame {frame}"
+            steps = part_of(capture(scene, view_layer, given, frames), i * one, one, f"{name}: ")
+            folder = yield from attempted(of_piece(steps, name), name, i * one, batch)
+            folders += [folder] if folder else []
+    if not folders:
+        raise SceneError("none of the frames could be captured: see what was said of each")
+    yield Progress(1.0, f"captured {len(folders)} frames, {len(given.hemicube)} patches each")
     return folders
+
+
+def look(
+    scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]
+) -> Steps[dict[int, ArtoError]]:
+    """Look at what the capture of some frames needs -> what is wrong, by frame.
+
+    The scene is left at the last frame.
+    """
+    wrong: dict[int, ArtoError] = {}
+    for number, frame in enumerate(frames):
+        yield Progress(0.0, f"looking at frame {number + 1} of {len(frames)}")
+        scene.frame_set(frame)
+        try:
+            check_scene(scene, view_layer)
+            check_patterns(scene)
+            check_place(scene, view_layer)
+        except ArtoError as e:
+            wrong[frame] = e
+    return wrong
+
+
+def _check_room(
+    scene: bpy.types.Scene, view_layer: str, given: Given, frames: Sequence[int]
+) -> None:
+    """Raise SceneError where the disk has no room for all frames that are not there yet."""
+    there = paths.frames(scene, view_layer)
+    left = sum(not there.get(frame) for frame in frames)
+    if left:
+        catches = any(thing.is_shadow_catcher for thing in scene.objects)
+        takes = 1 + len(TAKES) * catches
+        needed = room_for(scene, given).times(takes * left)
+        folder = paths.place(scene, view_layer).folder
+        room.check_disk(folder, needed.disk, f"the capture of {left} frames")
 
 
 def together(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> Steps[Given]:

@@ -121,19 +121,6 @@ def look(
     return wrong
 
 
-def summed(wrong: Mapping[Wanted, ArtoError], total: int) -> ArtoError:
-    """One error for what is wrong with some of many pictures."""
-    first = next(iter(wrong.values()))
-    if len(set(map(str, wrong.values()))) == 1:
-        return first
-    said = list(dict.fromkeys(f"{p.path.name}: {e}" for p, e in wrong.items()))
-    more = f"\n  and {len(said) - 10} more" if len(said) > 10 else ""
-    return type(first)(
-        f"{len(wrong)} of {total} pictures cannot be made, so none was begun (--keep-going makes "
-        "the others):\n  " + "\n  ".join(said[:10]) + more
-    )
-
-
 def _names(pictures: Sequence[Wanted]) -> dict[Wanted, ArtoError]:
     """Pictures that would be written over another one."""
     by_name: dict[str, list[Wanted]] = {}

@@ -18,7 +18,7 @@ from ...core.relight import together
 from ..blender.nodes import new_world
 from ..capture.sequence import frame_kept
 from ..plate.present import present_frames
-from ..work import PLAIN, Batch, Failed, Progress, Steps, failed, tried
+from ..work import PLAIN, Batch, Progress, Steps, failed, looked, tried
 from ..world.check import check_world
 from ..world.dials import turned
 from . import ahead
@@ -55,10 +55,8 @@ def relight_many(
     scene.view_layers[view_layer].update()
     pictures = ahead.wanted(scene, worlds, turns, frames)
     wrong = yield from ahead.look(scene, view_layer, pictures, batch.strict)
-    for one, error in wrong.items():
-        yield Failed(0.0, f"{one.path.name} cannot be made: {error}", one.path.name, error)
-    if wrong and not (batch.keep_going and len(wrong) < len(pictures)):
-        raise ahead.summed(wrong, len(pictures))
+    named = {one.path.name: error for one, error in wrong.items()}
+    yield from looked(named, len(pictures), "pictures", batch)
     left = [one for one in pictures if one not in wrong]
     done = yield from _made(scene, view_layer, left, batch)
     if not done:

@@ -14,6 +14,7 @@ import os
 import re
 import shutil
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -170,7 +171,7 @@ def nearest(scene: bpy.types.Scene, view_layer: str | None = None) -> Shot | Non
     found = []
     for header in root.glob(f"*/*/*/{HEADER}"):
         there = _shot_in(header.parent)
-        if there and shot.scene_id and there[0].scene_id == shot.scene_id:
+        if there and _same_scene(shot, there[0]):
             then = there[0]
             if _anything_in(header.parent) and then.difference(shot):
                 alike = (then.view_layer == shot.view_layer) + (then.camera == shot.camera)
@@ -179,21 +180,42 @@ def nearest(scene: bpy.types.Scene, view_layer: str | None = None) -> Shot | Non
 
 
 def frames(scene: bpy.types.Scene, view_layer: str) -> dict[float, bool]:
-    """Find the frames of which a capture was begun -> by frame, whether there is a field. Raises
-    SceneError, OSError."""
+    """Find the frames of which a capture was begun -> by frame, whether there is a field.
+
+    A frame that was asked for together with a captured one counts as begun. Raises SceneError,
+    OSError.
+    """
     root, shot = _root(scene), shot_of(scene, view_layer)
     found: dict[float, bool] = {}
     for header in root.glob(f"*/*/*/{HEADER}"):
         there = _shot_in(header.parent)
-        if not there or not shot.scene_id:
+        if not there or not _anything_in(header.parent):
             continue
         then = there[0]
-        if (then.scene_id, then.view_layer) != (shot.scene_id, shot.view_layer):
+        if not _same_scene(shot, then) or then.view_layer != shot.view_layer:
             continue
         frame = then.frame + (then.subframe or 0.0)
         whole = (header.parent / "field" / FIELD_HEADER).is_file()
         found[frame] = found.get(frame, False) or whole
+        for other in _together_with(header.parent):
+            found.setdefault(other, False)
     return found
+
+
+def _same_scene(shot: Shot, there: Shot) -> bool:
+    """Whether two shots are of one scene: by its ID, or by names where the scene has none yet."""
+    if shot.scene_id:
+        return there.scene_id == shot.scene_id
+    return bool(shot.file) and (shot.file, shot.scene) == (there.file, there.scene)
+
+
+def _together_with(folder: Path) -> list[int]:
+    """The frames that were to be captured together with the one in a shot's folder."""
+    try:
+        said = Description(folder / HEADER, ShotError, _MOST_BYTES).kind("frames", list, [])
+    except ArtoError:
+        return []
+    return [frame for frame in said if type(frame) is int]
 
 
 def shown(scene: bpy.types.Scene) -> str:
@@ -229,8 +251,11 @@ def unfinished_folder(folder: Path, key: str) -> Path:
     return folder / f"unfinished-{key[:8]}"
 
 
-def claim(scene: bpy.types.Scene, view_layer: str) -> Path:
-    """Make the shot's own folder, mark it as the shot's, and return it. Raises SceneError."""
+def claim(scene: bpy.types.Scene, view_layer: str, together: Sequence[int] = ()) -> Path:
+    """Make the shot's own folder, mark it as the shot's, and return it.
+
+    together: the frames that are captured as one sequence, to be noted down. Raises SceneError.
+    """
     root, folder = _root(scene), place(scene, view_layer).folder
     there = _shot_in(folder)
     if scene_ids.of(scene) is None:
@@ -241,7 +266,12 @@ def claim(scene: bpy.types.Scene, view_layer: str) -> Path:
         relative = os.path.relpath(blend, root) if blend else ""
     except ValueError:  # The .blend is on another drive.
         relative = blend
-    about = {"shot": shot.to_json(), "blend": Path(relative).as_posix() if relative else ""}
+    about: dict[str, object] = {
+        "shot": shot.to_json(),
+        "blend": Path(relative).as_posix() if relative else "",
+    }
+    if len(together) > 1:
+        about["frames"] = list(together)
     text = text_of(about)
     try:
         path = folder / HEADER
