@@ -16,7 +16,7 @@ class Settings:
     size: float
     samples: int
     quality: Literal["DRAFT", "GOOD", "FINAL", "CUSTOM"]
-    patterns: Literal["moments", "moments_uv", "linear", "paper", "white", "packed", "packed_linear", "lobes"]
+    patterns: Literal["moments", "moments_uv", "linear", "paper", "white", "packed", "packed_linear", "lobes", "auto"]
     grain: bool
     route: Literal["all", "pattern", "single"]
     seed: int

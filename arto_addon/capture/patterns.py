@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+import bpy
 
 from ...core.capture.kinds import Route
 from ...core.fit.choice import SEARCH, STAGE_AND_MATTE
@@ -13,7 +13,7 @@ from ...core.supports import SUPPORTS
 AUTO = "auto"
 
 
-def patterns_of(settings: Any, route: Route | None = None) -> PatternSet:
+def patterns_of(settings: bpy.types.ArtoSettings, route: Route | None = None) -> PatternSet:
     """Find the patterns of a capture with these settings.
 
     `AUTO` means the patterns by lobe wherever the fit chooses its models by itself: they alone show

@@ -15,7 +15,7 @@ import bpy
 
 from ...core.capture.capture_set import CaptureSet
 from ...core.capture.head import CaptureHead
-from ...core.capture.kinds import Take
+from ...core.capture.kinds import Quality, Take
 from ...core.errors import FarmError
 from ..capture import room
 from ..capture.capture import plan_of
@@ -156,7 +156,7 @@ def settings_of(scene: bpy.types.Scene) -> dict[str, object]:
         value = getattr(scene.arto, name)
         found[name] = sorted(value) if isinstance(value, set) else value
     if samples_told(scene):
-        found["quality"] = "CUSTOM"
+        found["quality"] = Quality.CUSTOM
     return found
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from ...core.capture.kinds import Keep, Quality, Route
 from ...core.faces import FACE_NAMES
 from ...core.fit.choice import CHOICES
 from ...core.patterns import PATTERN_SETS
@@ -45,8 +46,7 @@ _SUPPORTS = {
 
 
 def _item(name: str, texts: dict[str, tuple[str, str]]) -> Item:
-    title, words = texts.get(name, (name.replace("_", " ").title(), ""))
-    return name, title, words
+    return name, *texts[name]
 
 
 HEMICUBE = (
@@ -204,12 +204,12 @@ CAPTURE = (
         words="Samples of the capture, as a multiple of the scene's own (of no more than 256 "
         "where it has a noise threshold). Their noise is the main error of the relit picture",
         items=(
-            ("DRAFT", "Draft", "A quarter of the scene's own samples"),
-            ("GOOD", "Good", "As many samples as the scene's own"),
-            ("FINAL", "Final", "Four times the scene's own samples"),
-            ("CUSTOM", "Custom", "A number of samples of your own"),
+            (Quality.DRAFT, "Draft", "A quarter of the scene's own samples"),
+            (Quality.GOOD, "Good", "As many samples as the scene's own"),
+            (Quality.FINAL, "Final", "Four times the scene's own samples"),
+            (Quality.CUSTOM, "Custom", "A number of samples of your own"),
         ),
-        default="GOOD",
+        default=Quality.GOOD,
         work="capture",
         decides=Decides.CAPTURE_MADE,
         farm=True,
@@ -249,11 +249,11 @@ CAPTURE = (
         title="Renders",
         words="How the patches and patterns are told apart",
         items=(
-            ("all", "All at Once", "All patches and patterns in one render, by light groups"),
-            ("pattern", "One a Pattern", "A light group for each patch"),
-            ("single", "One a Patch and Pattern", "As in the paper; slow"),
+            (Route.ALL, "All at Once", "All patches and patterns in one render, by light groups"),
+            (Route.PATTERN, "One a Pattern", "A light group for each patch"),
+            (Route.SINGLE, "One a Patch and Pattern", "As in the paper; slow"),
         ),
-        default="all",
+        default=Route.ALL,
         work="capture",
         decides=Decides.CAPTURE,
         farm=True,
@@ -293,11 +293,11 @@ CAPTURE = (
         title="Keep Basis Images",
         words="Whether what was rendered stays on disk once it is fitted",
         items=(
-            ("never", "Never", "Each tile is fitted as it comes; the field is all that stays"),
-            ("fits", "If They Fit", "Keep them where they take no more than the limit"),
-            ("always", "Always", "Keep them: Fit is a step of its own, with any support"),
+            (Keep.NEVER, "Never", "Each tile is fitted as it comes; the field is all that stays"),
+            (Keep.FITS, "If They Fit", "Keep them where they take no more than the limit"),
+            (Keep.ALWAYS, "Always", "Keep them: Fit is a step of its own, with any support"),
         ),
-        default="never",
+        default=Keep.NEVER,
         work="capture",
         decides=Decides.CAPTURE_KEPT,
         farm=True,

@@ -38,7 +38,7 @@ class Decides(Enum):
     CAPTURE_TILES = "capture, by its tiles"
     # The value decides which basis images are kept.
     CAPTURE_KEPT = "capture, by what is kept of it"
-    # The value counts unless `keep` is "always": a field cannot be fitted again without its basis
+    # The value counts unless `keep` is `always`: a field cannot be fitted again without its basis
     # images, so another fit needs another capture.
     CAPTURE_FIT = "capture, by its fit"
     # The key of a plate has the value itself.

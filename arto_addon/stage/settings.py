@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import bpy
 
+from ...core.capture.kinds import Quality
 from ..blender.nodes import dark_world
 from .stage import Stage
 
@@ -85,7 +86,7 @@ def prepare(on: Stage, layers: int) -> None:
 
 # By quality: the factor on a scene's own samples. Where a scene has a noise threshold, few pixels
 # take all samples, so no more than MOST_ADAPTIVE count.
-QUALITIES = {"DRAFT": 0.25, "GOOD": 1.0, "FINAL": 4.0}
+QUALITIES = {Quality.DRAFT: 0.25, Quality.GOOD: 1.0, Quality.FINAL: 4.0}
 MOST_ADAPTIVE = 256
 
 
@@ -100,10 +101,10 @@ def samples_told(scene: bpy.types.Scene) -> bool:
 def samples_of(scene: bpy.types.Scene) -> int:
     """The samples of a capture, by the quality or the number that the artist chose."""
     s, cycles = scene.arto, scene.cycles
-    if s.quality == "CUSTOM" or samples_told(scene):
+    if s.quality == Quality.CUSTOM or samples_told(scene):
         return s.samples
     own = min(cycles.samples, MOST_ADAPTIVE) if cycles.use_adaptive_sampling else cycles.samples
-    return max(1, round(own * QUALITIES[s.quality]))
+    return max(1, round(own * QUALITIES[Quality(s.quality)]))
 
 
 def looks_otherwise(scene: bpy.types.Scene) -> list[str]:

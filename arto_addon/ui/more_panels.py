@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ...core.capture.kinds import Keep
 from ...core.errors import ArtoError
 from ...core.faces import SIDES
 from ...core.units import size
@@ -110,7 +111,7 @@ class Storage(Draws):
         say(column, context, "Relit Picture")
         column.prop(settings, "output", text="")
         column.prop(settings, "keep", text="")
-        if settings.keep == "fits":
+        if settings.keep == Keep.FITS:
             column.prop(settings, "keep_limit")
         column.prop(settings, "memory")
 

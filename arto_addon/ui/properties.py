@@ -13,6 +13,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from ...core.capture.kinds import Quality
 from ...core.faces import FACE_NAMES, PRESETS
 from ..plate import compare
 from ..plate.present import use
@@ -37,7 +38,7 @@ def _preset_chosen(self: ArtoSettings, context: bpy.types.Context) -> None:
 
 def _samples_chosen(self: ArtoSettings, context: bpy.types.Context) -> None:
     # the samples count only with this quality, which a script would not set besides
-    self.quality = "CUSTOM"
+    self.quality = Quality.CUSTOM
 
 
 def _use_chosen(self: ArtoSettings, context: bpy.types.Context) -> None:

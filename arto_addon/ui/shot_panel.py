@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ...core.capture import kinds
 from ...core.units import clock
 from ..job import session
 from ..job.session import SecondBlender
@@ -68,7 +69,7 @@ def _buttons(column: bpy.types.UILayout, context: bpy.types.Context, found: stat
     column.separator(factor=0.5)
     row = column.row(align=True)
     row.prop(scene.arto, "quality", text="")
-    if scene.arto.quality == "CUSTOM":
+    if scene.arto.quality == kinds.Quality.CUSTOM:
         row.prop(scene.arto, "samples", text="")
     big = column.row(align=True)
     big.scale_y = 1.6
@@ -126,7 +127,7 @@ class Quality(Draws):
 
         scene, settings = context.scene, context.scene.arto
         column.prop(settings, "quality", text="Capture")
-        if settings.quality == "CUSTOM":
+        if settings.quality == kinds.Quality.CUSTOM:
             column.prop(settings, "samples")
         say(column, context, tr("{samples} samples a pixel", samples=samples_of(scene)))
         sub = column.column()

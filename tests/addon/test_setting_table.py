@@ -72,7 +72,8 @@ def test_a_scene_has_the_settings_of_the_table(scene):
 
 def test_the_types_of_settings_are_those_of_the_table():
     """pyright checks the names of settings and the items of choices by these files."""
-    assert setting_types.FILE.read_text(encoding="utf-8") == setting_types.text()
+    there = setting_types.FILE.read_text(encoding="utf-8")
+    assert there == setting_types.text(), "run python -m tools.setting_types"
     lists = setting_types.FILE.with_name("arto_lists.pyi").read_text(encoding="utf-8")
     said = {
         node.name: {line.target.id for line in node.body if isinstance(line, ast.AnnAssign)}

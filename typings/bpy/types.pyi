@@ -1,6 +1,6 @@
 from typing import Any
 
-from arto_settings import Settings
+from arto_settings import Settings as ArtoSettings
 
 # A data-block: anything may be in it, but what ARTO puts there is known.
 class _Block:
@@ -12,7 +12,7 @@ class _Block:
     def __contains__(self, name: str) -> bool: ...
 
 class Scene(_Block):
-    arto: Settings
+    arto: ArtoSettings
 
 class _Dials:
     rotation: float
