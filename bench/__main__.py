@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
 
@@ -13,21 +12,25 @@ from . import mirrors_command
 def _demo(options: argparse.Namespace) -> None:
     from .demo import demo
 
+    width, samples, many = {"shot": (480, 64, 96), "plate": (160, 128, 512), "looks": (320, 64, 0)}[
+        options.what
+    ]
+    width, samples = options.width or width, options.samples or samples
+    many = options.many or many
+    size = (width, width * 3 // 4)
     if options.what == "looks":
         from .looks_demo import looks_demo
 
-        size = (options.width, options.width * 3 // 4)
         sheet = options.picture or options.out / "looks.png"
-        for name, seconds in looks_demo(sheet, size, options.samples, options.out).items():
+        for name, seconds in looks_demo(sheet, size, samples, options.out).items():
             print(f"{name}: {seconds:.1f} s")
         print(f"look at {sheet}")
         return
     if options.what == "plate":
         from .plate_demo import plate_demo, table
 
-        size = (options.width, options.width * 3 // 4)
         sheet = options.picture or options.out / "plates.png"
-        print(table(plate_demo(sheet, size, options.samples, options.many)))
+        print(table(plate_demo(sheet, size, samples, many)))
         print(f"look at {sheet}")
         return
 
@@ -35,9 +38,9 @@ def _demo(options: argparse.Namespace) -> None:
         options.out,
         options.scene,
         options.hdri,
-        (options.width, options.width * 3 // 4),
-        options.samples,
-        options.many,
+        size,
+        samples,
+        many,
         options.picture,
         **{
             name: value
@@ -45,7 +48,7 @@ def _demo(options: argparse.Namespace) -> None:
             if (value := getattr(options, name)) is not None
         },
     )
-    print(json.dumps(report, indent=1))
+    print(f"capture {report['capture_seconds']:.0f} s, a relight {report['relight_seconds']:.1f} s")
     print(f"look at {options.out / 'comparison.png'}")
 
 
@@ -244,11 +247,11 @@ def main() -> int:
     c = commands.add_parser("demo", help="capture, fit, relight a scene; compare with Cycles")
     c.add_argument("what", nargs="?", choices=("shot", "plate", "looks"), default="shot")
     c.add_argument("--out", type=Path, default=Path("out/demo"))
-    c.add_argument("--scene", default="product")
+    c.add_argument("--scene", default="four_spheres")
     c.add_argument("--hdri", default="courtyard")
-    c.add_argument("--width", type=int, default=160)
-    c.add_argument("--samples", type=int, default=128)
-    c.add_argument("--many", type=int, default=512, help="samples of each of two references")
+    c.add_argument("--width", type=int)
+    c.add_argument("--samples", type=int)
+    c.add_argument("--many", type=int, help="samples of each of two references")
     c.add_argument("--patches", type=int, help="these and the next: the add-on's settings")
     c.add_argument("--patterns")
     c.add_argument("--support")
