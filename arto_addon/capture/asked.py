@@ -157,6 +157,8 @@ def begun(
         key=this.key,
         patterns=plan.patterns,
         route=plan.route,
+        # of sampled lights Cycles leaves out the faint ones
+        radiance=None if plan.route == Route.SAMPLED else planes.FAINT,
         grain=plan.grain,
         kept=plan.kept,
         choice=settings.support,

@@ -240,7 +240,7 @@ def set_tile(
     # the scene's own lamps are in every render; the first render separates them by group
     sampled = head.route == Route.SAMPLED
     own = not sampled and images == plan_of(head)[0]
-    return planes.lit(on, head.hemicube, head.patterns, images, sampled, own)
+    return planes.lit(on, head.hemicube, head.patterns, images, sampled, own, head.radiance or 1.0)
 
 
 def render_tile(on: Stage, head: CaptureHead, number: int, folder: Path) -> Steps[list[str]]:

@@ -27,6 +27,10 @@ FAR = 1000.0
 # small that a point of the patch keeps its direction, and so wide that float32 at 1,000 radii does
 # not lose it.
 GAP = 1e-4
+# What the patches of a capture emit where a pattern is 1. Cycles adds the emission that a mirror or
+# glass shows to the albedo that guides the denoiser, and there it must not be seen. A power of two
+# changes no bit of what the light is.
+FAINT = 2.0**-14
 # Most light groups that shadow rays can tell apart: Cycles has 8 bits for them. With more groups,
 # some would lose their light without a message.
 MOST_SAMPLED = 255
@@ -103,22 +107,25 @@ def _radiance(nodes: Nodes, name: str, patterns: PatternSet) -> list[Input]:
     ]
 
 
-def _shader(nodes: Nodes, radiance: list[Input]) -> bpy.types.NodeSocket:
-    """Emission, plus what lies behind; radiance: see `_radiance`.
+def _shader(nodes: Nodes, shown: list[Input], radiance: float) -> bpy.types.NodeSocket:
+    """Emission, plus what lies behind; shown: see `_radiance`; radiance: what 1 of it is.
 
     The background lies behind the last pattern. There Cycles adds the scene's sun lamps to
     scattered rays. An opaque patch would hide the suns' mirror images.
     """
-    if len(radiance) == 1:
-        light = nodes.add("ShaderNodeEmission", (1, 1, 1, 1), radiance[0]).outputs[0]
+    if len(shown) == 1:
+        colour: Input = (radiance, radiance, radiance, 1)
+        light = nodes.add("ShaderNodeEmission", colour, shown[0]).outputs[0]
     else:
-        colour = nodes.add("ShaderNodeCombineColor", *radiance).outputs[0]
-        light = nodes.add("ShaderNodeEmission", colour, 1.0).outputs[0]
+        colour = nodes.add("ShaderNodeCombineColor", *shown).outputs[0]
+        light = nodes.add("ShaderNodeEmission", colour, radiance).outputs[0]
     behind = nodes.add("ShaderNodeBsdfTransparent").outputs[0]
     return nodes.add("ShaderNodeAddShader", light, behind).outputs[0]
 
 
-def pattern_material(name: str, patterns: PatternSet, sampled: bool = False) -> bpy.types.Material:
+def pattern_material(
+    name: str, patterns: PatternSet, sampled: bool = False, radiance: float = 1.0
+) -> bpy.types.Material:
     """Emission of a pattern of the set (or of `GRAIN`), plus what lies behind."""
     material = new_material(f"ARTO {name}")
     # paths find the patches, and no shadow ray is cast at them: Cycles' limit of 255 light groups
@@ -127,12 +134,18 @@ def pattern_material(name: str, patterns: PatternSet, sampled: bool = False) -> 
     tree = material.node_tree
     tree.nodes.clear()
     nodes = Nodes(tree)
-    nodes.add("ShaderNodeOutputMaterial", _shader(nodes, _radiance(nodes, name, patterns)))
+    nodes.add(
+        "ShaderNodeOutputMaterial", _shader(nodes, _radiance(nodes, name, patterns), radiance)
+    )
     return material
 
 
 def overriding_material(
-    override: bpy.types.Material, names: list[str], patterns: PatternSet, sampled: bool = False
+    override: bpy.types.Material,
+    names: list[str],
+    patterns: PatternSet,
+    sampled: bool = False,
+    radiance: float = 1.0,
 ) -> bpy.types.Material:
     """A view layer's material override, on the artist's objects; on a plane, its pattern.
 
@@ -157,7 +170,7 @@ def overriding_material(
             total[c] = nodes.math("MULTIPLY_ADD", mine, value, total[c])
     plane = nodes.math("GREATER_THAN", number.outputs["Fac"], 0.5)
     output = tree.get_output_node("CYCLES") or tree.nodes.new("ShaderNodeOutputMaterial")
-    for socket, pattern in (("Surface", _shader(nodes, total)), ("Volume", None)):
+    for socket, pattern in (("Surface", _shader(nodes, total, radiance)), ("Volume", None)):
         links = output.inputs[socket].links
         if not links and pattern is None:
             continue
@@ -211,6 +224,7 @@ def build(
     made: Made,
     mark: str = "",
     sampled: bool = False,
+    radiance: float = 1.0,
 ) -> None:
     """Fill `collection` with a plane for each (patch, pattern name) of `images`.
 
@@ -219,7 +233,7 @@ def build(
     """
     images = list(images)
     used = list(dict.fromkeys(name for _, name in images))
-    materials = {name: made(pattern_material(name, patterns, sampled)) for name in used}
+    materials = {name: made(pattern_material(name, patterns, sampled, radiance)) for name in used}
     centre = np.array(hemicube.centre)
     for k, pattern in images:
         name = group_name(k, pattern)
@@ -269,11 +283,13 @@ def lit(
     images: Iterable[tuple[int, str]],
     sampled: bool = False,
     own: bool = False,
+    radiance: float = 1.0,
 ) -> Iterator[None]:
     """Put the planes of some images around the stage, with light groups, for as long as it is open.
 
     sampled: whether Cycles also casts shadow rays at the patches, as it does at a world; it can do
     so for at most `MOST_SAMPLED` images. own: whether the artist's light groups are written too.
+    radiance: what the patches emit where a pattern is 1, see `FAINT`.
     """
     made: list[bpy.types.ID] = []
     images = list(images)
@@ -289,10 +305,11 @@ def lit(
     try:
         if override:
             names = list(dict.fromkeys(name for _, name in images))
-            layer.material_override = note(overriding_material(override, names, patterns, sampled))
+            shown = overriding_material(override, names, patterns, sampled, radiance)
+            layer.material_override = note(shown)
         collection = note(bpy.data.collections.new("ARTO Capture"))
         on.scene.collection.children.link(collection)
-        build(collection, hemicube, patterns, images, note, free_mark(), sampled)
+        build(collection, hemicube, patterns, images, note, free_mark(), sampled, radiance)
         planes = list(collection.objects)
         if len(patterns) > 1:
             # One pattern alone has no ratios to keep, and the coin after it costs it no noise.

@@ -51,6 +51,8 @@ class BasisImages:
         Whether all images of a patch are of one render. Otherwise no pattern shows grain.
     sums : dict of str to int, optional
         The checksums of the files, by their names. A file is compared with its own, if it has one.
+    radiance : float
+        Of the patches in the files, where a pattern is 1.
 
     Raises
     ------
@@ -68,11 +70,12 @@ class BasisImages:
         grain: bool = False,
         together: bool = True,
         sums: Mapping[str, int] | None = None,
+        radiance: float = 1.0,
     ) -> None:
         self.folder, self.region = folder, region
         self.hemicube, self.patterns, self.grain = hemicube, patterns, grain
         self.together = together
-        expected = Expected(folder, self.shape, hemicube, patterns, grain)
+        expected = Expected(folder, self.shape, hemicube, patterns, grain, radiance)
         self._files = ExitStack()
         try:
             with self._files as files:

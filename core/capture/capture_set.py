@@ -108,6 +108,7 @@ class CaptureSet:
             # the paths of two renders differ: the grain of one is not that of the other
             self.head.route in (None, Route.ALL),
             entry.sums,
+            self.head.radiance or 1.0,
         )
 
     def read(self, tile: int) -> TileData:

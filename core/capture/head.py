@@ -39,12 +39,15 @@ from .kinds import Route, Take
 from .tile_entry import MOST_SAMPLES, TileEntry
 
 FORMAT = "ARTO capture set"
-VERSION = 1
+VERSION = 2
+READABLE = (1, VERSION)
 HEADER = "capture.json"
 # What Blender takes for a seed, and for a frame.
 LARGEST_SEED = LARGEST_FRAME = 2**31 - 1
 # A hundred years.
 LONGEST = 3.2e9
+# Fainter patches would come near the smallest of 32-bit floats.
+LEAST_RADIANCE = 2.0**-60
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,7 @@ class CaptureHead:
     samples : of each pixel, all seeds together. 0 where the set was rendered without noise.
     seed : of the noise.
     route : how patches and patterns were told apart.
+    radiance : of the patches where a pattern is 1, in the files; 1 where it is not said.
     grain : whether each patch has an image more that shows its noise.
     adaptive : whether the patches are as fine as the scene needs them.
     far : whether the light comes from far away, as a world's.
@@ -88,6 +92,7 @@ class CaptureHead:
     samples: float | None = None
     seed: int | None = None
     route: Route | None = None
+    radiance: float | None = None
     grain: bool | None = None
     adaptive: bool | None = None
     far: bool | None = None
@@ -162,6 +167,7 @@ class CaptureHead:
             samples=said.real("samples", 0, MOST_SAMPLES),
             seed=said.count("seed", 0, LARGEST_SEED),
             route=said.one_of("route", Route),
+            radiance=said.real("radiance", LEAST_RADIANCE, 1),
             grain=said.kind("grain", bool),
             adaptive=said.kind("adaptive", bool),
             far=said.kind("far", bool),
@@ -216,7 +222,7 @@ class CaptureHead:
         written = self._written()
         out: dict[str, Any] = {
             "format": written["format"],
-            "version": VERSION,
+            "version": VERSION if self.radiance else READABLE[0],
             "height": self.height,
             "width": self.width,
             "hemicube": self.hemicube.to_json(),
@@ -300,10 +306,10 @@ def _check_version(said: Values) -> None:
     if "version" not in said.data:
         raise said.error(f"{said.path} cannot be read (it has no version)")
     version = said.data["version"]
-    if type(version) is not int or version != VERSION:
+    if type(version) is not int or version not in READABLE:
         raise CaptureSetError(
             f"{said.path.parent} is a capture set of version {version!s:.20}; this ARTO reads "
-            f"version {VERSION}: capture again, or use the ARTO that made it"
+            f"versions {READABLE[0]} and {VERSION}: capture again, or use the ARTO that made it"
         )
 
 

@@ -47,6 +47,8 @@ class Expected:
     patterns : PatternSet
     grain : bool
         Whether there is a grain for each patch, see `names.GRAIN`.
+    radiance : float
+        Of the patches in the files, where a pattern is 1.
     """
 
     folder: Path
@@ -54,6 +56,12 @@ class Expected:
     hemicube: Hemicube
     patterns: PatternSet
     grain: bool
+    radiance: float = 1.0
+
+    @property
+    def times(self) -> np.float32:
+        """By how much the files are brighter where the patches have radiance 1."""
+        return np.float32(1 / self.radiance)
 
 
 class Seed:
@@ -139,7 +147,7 @@ class Seed:
         if (k, pattern) not in self._looked:
             self._check(number, layer, pixels, (*self.of.shape, 3))
             self._looked.add((k, pattern))
-        return pixels
+        return pixels * self.of.times
 
     def images(self, k: int) -> NDArray[np.float32]:
         """Read the basis images of a patch.
@@ -169,6 +177,7 @@ class Seed:
                     self._looked.add((k, name))
             else:
                 self.image(k, name)  # raises the error that says what is wrong
+        out *= self.of.times
         return out
 
     def images_at(self, k: int, pixels: NDArray[np.intp]) -> NDArray[np.float32]:
@@ -191,6 +200,7 @@ class Seed:
             for c, plane in enumerate(self.files[number].planes(layer)):
                 image[:, c] = plane[at]
             self.files[number].let_go(layer)
+        out *= self.of.times
         return out
 
     def add(self, k: int, images: NDArray, lit: NDArray) -> None:
@@ -232,8 +242,9 @@ class Seed:
         number, layer = self.others[COMBINED]
         combined = self.files[number].read(layer)
         self._check(number, layer, combined, (*self.of.shape, 4))
-        own = np.asarray(combined[..., :3] - lit)
-        own[np.abs(own) < ROUNDING * lit] = 0
+        there = lit * self.of.radiance
+        own = np.asarray(combined[..., :3] - there)
+        own[np.abs(own) < ROUNDING * there] = 0
         guides = {}
         for guide in self.others.keys() - {COMBINED}:
             number, layer = self.others[guide]
@@ -256,7 +267,7 @@ class Seed:
                 "save it as 32-bit float, or capture again"
             )
         # the scene's own lamps, which only Combined has, may be as bright as they like
-        most = BRIGHTEST if shape[-1] == 3 else np.inf
+        most = BRIGHTEST * self.of.radiance if shape[-1] == 3 else np.inf
         # a comparison of the bits finds negative numbers, infinities and NaN in one pass
         bits = pixels.view(np.int32) if pixels.flags.c_contiguous else None
         if bits is None or not _within(bits.reshape(-1), most):

@@ -233,7 +233,7 @@ def test_bytes_that_are_no_text(folder: Path) -> None:
 
 def test_another_version(folder: Path) -> None:
     change_header(folder, version=VERSION + 1)
-    says = f"version {VERSION + 1}; this ARTO reads version {VERSION}"
+    says = f"version {VERSION + 1}; this ARTO reads versions 1 and {VERSION}"
     refused(folder, says, "use the ARTO that made it")
 
 
