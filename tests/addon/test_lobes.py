@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from arto.arto_addon.capture import planned
+from arto.arto_addon.capture import planes, planned
 from arto.core.capture.kinds import Route
 from arto.core.errors import SceneError
 from arto.core.measure import uniform_moments
 from arto.core.patterns import ONE, UU, VV, U, V, pattern_set
-from scene_tools import captured, small_scene
+from scene_tools import captured, material, small_scene
 
 
 def shot(folder, patterns: str, **settings):
@@ -87,3 +87,24 @@ def test_lobes_are_refused_where_light_comes_by_shadow_rays_alone(tmp_path, monk
     monkeypatch.setattr(planned, "light_route", by_shadow_rays)
     with pytest.raises(SceneError, match="choose the patterns '1, u, v'"):
         captured(scene)
+
+
+def test_faint_patches_are_the_same_light_and_none_in_the_guides(tmp_path, monkeypatch) -> None:
+    """A mirror shows the patches, and their colours were in the albedo that guides the denoiser."""
+    found = []
+    for name, radiance in (("bright", 1.0), ("faint", planes.FAINT)):
+        monkeypatch.setattr(planes, "FAINT", radiance)
+        scene = small_scene(tmp_path / name)
+        for thing in scene.objects:
+            if thing.type == "MESH":
+                thing.data.materials.clear()
+                thing.data.materials.append(material("Mirror", Metallic=1.0, Roughness=0.0))
+        scene.arto.samples, scene.arto.patches, scene.arto.adaptive = 4, 1, False
+        found.append(captured(scene).read(0))
+    bright, faint = found
+    assert bright.basis.max() > 0.1
+    np.testing.assert_array_equal(faint.basis, bright.basis)
+    np.testing.assert_array_equal(faint.own, bright.own)
+    # what leaves the scene has no albedo but the light it shows
+    assert bright.guides["albedo"].max() > 1.5
+    assert faint.guides["albedo"].max() < 1.001
