@@ -10,9 +10,12 @@ from ...core.capture.kinds import Keep
 from ...core.errors import BusyError, SceneError
 from ...core.files import Lock
 from ...core.fit.choice import check as check_choice
+from ..blender.markers import camera_of
 from ..shot import paths
+from ..shot.shot import layer_of
 from ..stage.stage import picture_size
 from ..world.check import check_light_of, world_of
+from .drawn import check_drawn
 from .patterns import patterns_of
 from .simulations import unbaked
 
@@ -56,20 +59,22 @@ def check_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> None:
             f"the render engine is {scene.render.engine}: ARTO captures with Cycles; choose it in "
             "the render properties"
         )
-    if scene.camera is None:
+    if camera_of(scene) is None:
         raise SceneError("the scene has no camera: add one, or make one the scene's camera")
     if world := world_of(scene, view_layer):
         check_light_of(scene, world)
+    check_drawn(scene, view_layer or layer_of(scene))
     width, height = picture_size(scene)
     if min(width, height) < LEAST_PIXELS:
         raise SceneError(
             f"the picture has only {width}x{height} pixels: raise the resolution or its percentage"
         )
     if moving := unbaked(scene, view_layer or scene.view_layers[0].name):
-        were = "was" if moving.startswith(("the cloth", "the soft", "the hair")) else "were"
+        one = moving.startswith(("the cloth", "the soft", "the hair", "the dynamic"))
         raise SceneError(
-            f"{moving} {were} played and not baked, and a capture would show them elsewhere: bake "
-            "them (Physics properties, Cache), or go to their first frame"
+            f"{moving} {'was' if one else 'were'} played and not baked, and a capture would show "
+            "them elsewhere: bake them (Physics properties, Cache or Simulation Nodes), or go to "
+            "their first frame"
         )
     if not scene.arto.faces:
         raise SceneError("the hemicube has no faces: choose at least one")

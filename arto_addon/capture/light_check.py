@@ -16,7 +16,7 @@ from ...core.capture.names import combined
 from ...core.hemicube import Hemicube
 from ...core.light.environment import Environment, directions, sample_directions
 from ...core.patterns import pattern_set
-from ..blender.nodes import shader_tree, trees
+from ..blender.reached import gives, reached
 from ..stage.small import parts_of, small
 from ..stage.stage import Stage
 from ..work import Steps, Warned
@@ -57,15 +57,19 @@ def check_light(on: Stage, hemicube: Hemicube) -> Steps[tuple[bool, Caution | No
         truth = np.stack(expected)
         tricked = _tricks_shadows()
         different = SUSPECTED if tricked else DIFFERENT
-        seen = agreement(found, truth, own, different)
+        white = on.scene.cycles.film_exposure
+        seen = agreement(found, truth, own, different, white)
         sampled, text = False, ""
         if not seen.agrees and (seen.worst < 1 or tricked):
             found = yield from _of_patches(on, hemicube, own, sampled=True)
-            again = agreement(found, truth, own, different)
+            again = agreement(found, truth, own, different, white)
             sampled = abs(again.ratio - 1) < abs(seen.ratio - 1)
             if sampled and again.agrees:
                 text = f"{_cause(on)}: it takes a render for each pattern, in which it is right"
             seen = again if sampled else seen
+        if not seen.agrees and not text:
+            deep = yield from _through_more(on, hemicube, found, own)
+            text = _words(on, seen, deep)
     text = text or _words(on, seen)
     if not text:
         return False, None
@@ -99,8 +103,29 @@ def _white(on: Stage, hemicube: Hemicube) -> bpy.types.World:
     )
 
 
-def _words(on: Stage, seen: Agreement) -> str:
-    """Say to an artist what is wrong and what the cause may be; empty where nothing is wrong."""
+def _through_more(on: Stage, hemicube: Hemicube, found: np.ndarray, own: np.ndarray) -> Steps:
+    """Find out whether the scene's own limit of transparent bounces makes the difference -> bool.
+
+    The patches' light passes more surfaces than that limit, as the patches are transparent too. So
+    a white world is rendered once more without the limit.
+    """
+    black, seed, renders = on.scene.world, on.scene.cycles.seed, []
+    try:
+        on.scene.world = _white(on, hemicube)
+        for i in (1, 2):
+            on.scene.cycles.seed = seed + i
+            parts = yield from parts_of(on, "looking at how light passes transparent surfaces")
+            renders.append(combined(parts)[..., :3])
+    finally:
+        on.scene.world, on.scene.cycles.seed = black, seed
+    return agreement(found, np.stack(renders), own, white=on.scene.cycles.film_exposure).agrees
+
+
+def _words(on: Stage, seen: Agreement, deep: bool = False) -> str:
+    """Say to an artist what is wrong and what the cause may be; empty where nothing is wrong.
+
+    deep: see `_through_more`.
+    """
     if seen.dark and seen.agrees:
         return (
             "no light from outside reaches the picture: every world will look the same. Is the "
@@ -108,15 +133,19 @@ def _words(on: Stage, seen: Agreement) -> str:
         )
     if seen.agrees:
         return ""
-    least = f"{seen.worst:.0%} of a world's light reaches {seen.share:.0%} of the picture"
-    return (
-        f"only {least} in this capture: {_cause(on)}"
-        if seen.worst < 1
-        else (
-            f"{seen.worst:.0%} of a world's light is on {seen.share:.0%} of the picture in this "
-            f"capture: {_cause(on)}"
+    cause = _cause(on)
+    if deep:
+        most = on.changed["cycles.transparent_max_bounces"][0]
+        cause = (
+            f"light passes more than {most} transparent surfaces, as leaves or smoke behind each "
+            "other, where your render ends: raise Transparent (Render properties, Light Paths, Max "
+            "Bounces) until your render does not change any more"
         )
-    )
+    light = f"{seen.worst:.0%} of a world's light"
+    where = f"{seen.share:.0%} of the picture"
+    if seen.worst < 1:
+        return f"only {light} reaches {where} in this capture: {cause}"
+    return f"{light} is on {where} in this capture: {cause}"
 
 
 def _tricks_shadows() -> bool:
@@ -149,17 +178,29 @@ def _cause(on: Stage) -> str:
         if not thing.visible_diffuse:
             return f"'{thing.name}' is hidden from diffuse rays, and its shadow is not a world's"
         for slot in thing.material_slots:
-            if slot.material and _asks_for_shadow_rays(slot.material):
-                return (
-                    f"the material '{slot.material.name}' lets shadow rays through (Light Path), "
-                    "and only a world's light comes that way"
-                )
+            if slot.material and (why := _cause_in(slot.material)):
+                return why
     return "a material or a setting treats a world's light otherwise than light from surfaces"
 
 
-def _asks_for_shadow_rays(material: bpy.types.Material) -> bool:
-    return any(
-        node.bl_idname == "ShaderNodeLightPath" and node.outputs["Is Shadow Ray"].is_linked
-        for tree in trees(shader_tree(material), set())
-        for node in tree.nodes
-    )
+# Nodes that look around from a point, and the socket that says how far. Ambient Occlusion looks
+# around too, and agrees: it was tried to a distance beyond the patches.
+_LOOKING = {"ShaderNodeRaycast": "Length"}
+
+
+def _cause_in(material: bpy.types.Material) -> str:
+    """Why a material is lit by patches otherwise than by a world; empty where none is known."""
+    for node in reached(material):
+        if node.bl_idname == "ShaderNodeLightPath" and "Is Shadow Ray" in gives(node):
+            return (
+                f"the material '{material.name}' lets shadow rays through (Light Path), and only a "
+                "world's light comes that way"
+            )
+        if node.bl_idname in _LOOKING:
+            socket = _LOOKING[node.bl_idname]
+            return (
+                f"the material '{material.name}' looks around (node {node.bl_label}), and finds "
+                f"the patches far outside where a world has nothing: give the node a {socket} that "
+                "ends within the scene"
+            )
+    return ""

@@ -15,6 +15,7 @@ from ...core.capture.names import GRAIN, GROUP, group_name
 from ...core.faces import FACE_NAMES
 from ...core.hemicube import Hemicube
 from ...core.patterns import BASE, SHARP, PatternSet, pattern_set
+from ..blender.markers import camera_of
 from ..blender.nodes import Input, Nodes, made_of_nodes, new_material
 from ..stage.stage import Stage, free_mark
 
@@ -40,9 +41,9 @@ def wanted(scene: bpy.types.Scene, centre: Iterable[float], radius: float) -> He
     """The hemicube that the settings ask for, around a scene with this centre and radius."""
     s = scene.arto
     angle = s.rotation
-    if s.align == "camera" and scene.camera:
+    if s.align == "camera" and (camera := camera_of(scene)):
         # a camera looks along its -Z axis; only the heading about the vertical counts
-        look = -scene.camera.matrix_world.col[2].to_3d()
+        look = -camera.matrix_world.col[2].to_3d()
         angle += math.atan2(-look.x, look.y)
     x, y, z = (float(along) for along in centre)
     c, sn = math.cos(angle), math.sin(angle)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.region import Region
+from ..blender.markers import camera_of
 from ..blender.pictures import put
 
 IMAGE = "ARTO Live"
@@ -19,7 +20,7 @@ def view_of(
 
     None without a camera, and for a panorama, whose pixels do not lie on a plane.
     """
-    camera = scene.camera
+    camera = camera_of(scene)
     if camera is None or camera.type != "CAMERA" or camera.data.type == "PANO":
         return None
     corners = np.array([tuple(c) for c in camera.data.view_frame(scene=scene)], np.float32)

@@ -21,6 +21,7 @@ from bpy.app.handlers import persistent
 from ...core import exr
 from ...core.errors import ArtoError, SceneError
 from ...core.preview import Preview
+from ..blender.markers import camera_of
 from ..blender.quitting import not_when_quitting, when_quitting
 from ..job import session
 from ..plate.names import relit_file
@@ -156,7 +157,8 @@ class Live:
     @staticmethod
     def _place(scene: bpy.types.Scene) -> tuple[int, float, str, int, int]:
         """What tells this shot from other shots of the scene: frame, camera and picture size."""
-        camera = scene.camera.name if scene.camera else ""
+        bound = camera_of(scene)
+        camera = bound.name if bound else ""
         return scene.frame_current, scene.frame_subframe, camera, *picture_size(scene)
 
     def _same_field(self) -> bool:

@@ -19,6 +19,7 @@ from ...core import exr
 from ...core.errors import SceneError
 from ...core.exr.window import Box
 from ..blender.compositing import choose, compositor, darkroom, turned_off
+from ..blender.markers import camera_of
 from ..blender.pictures import put
 from ..stage.stage import picture_size
 from . import footage_file
@@ -291,7 +292,7 @@ class _Timing:
 
 
 def _behind_camera(scene: bpy.types.Scene) -> Footage | None:
-    camera = scene.camera
+    camera = camera_of(scene)
     if camera is None or camera.type != "CAMERA" or not camera.data.show_background_images:
         return None
     for behind in camera.data.background_images:

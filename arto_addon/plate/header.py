@@ -7,6 +7,7 @@ import time
 
 import bpy
 
+from ..blender.markers import camera_of
 from ..shot import home
 
 
@@ -17,10 +18,11 @@ def header(scene: bpy.types.Scene) -> dict[str, object]:
     a plate is not rendered.
     """
     render = scene.render
-    camera, digits = scene.camera, len(str(max(scene.frame_end, 1)))
+    camera, digits = camera_of(scene), len(str(max(scene.frame_end, 1)))
     markers = [m for m in scene.timeline_markers if m.frame <= scene.frame_current]
     marker = max(markers, key=lambda m: m.frame, default=None)
-    perspective = camera and camera.type == "CAMERA" and camera.data.type == "PERSP"
+    data = camera.data if camera and camera.type == "CAMERA" else None
+    lens = f"{data.lens:.2f}" if data and data.type == "PERSP" else ""
     fields = {
         "filename": ("File", home.file() or "<untitled>"),
         "date": ("Date", time.strftime("%Y/%m/%d %H:%M:%S")),
@@ -28,7 +30,7 @@ def header(scene: bpy.types.Scene) -> dict[str, object]:
         "frame": ("Frame", f"{scene.frame_current:0{digits}d}"),
         "frame_range": ("FrameRange", f"{scene.frame_start}:{scene.frame_end}"),
         "camera": ("Camera", camera.name if camera else ""),
-        "lens": ("Lens", f"{camera.data.lens:.2f}" if perspective else ""),
+        "lens": ("Lens", lens),
         "scene": ("Scene", scene.name),
         "note": ("Note", render.stamp_note_text),
         "marker": ("Marker", marker.name if marker else ""),

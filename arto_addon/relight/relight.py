@@ -17,6 +17,7 @@ from ...core.light.light import PatchLight
 from ...core.region import Region
 from ...core.relight import over
 from ..blender import denoise
+from ..capture.drawn import check_drawn
 from ..plate import plate
 from ..plate.names import relit_file
 from ..plate.present import present
@@ -65,6 +66,7 @@ def compute(
     """
     layer = view_layer or layer_of(scene)
     check_world(scene, layer)
+    check_drawn(scene, layer)
     scene.view_layers[layer].update()
     path = relit_file(scene)
     shown = Shown(scene, layer)

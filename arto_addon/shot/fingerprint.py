@@ -19,6 +19,7 @@ from collections.abc import Iterable
 import bpy
 import numpy as np
 
+from ..blender.markers import camera_of
 from . import walk
 
 Fingerprint = dict[str, str]
@@ -79,7 +80,7 @@ def fingerprint(
     if full:
         forget()
     layer = scene.view_layers[view_layer]
-    roots: list[bpy.types.ID] = [*_rendered(layer), *filter(None, [scene.camera])]
+    roots: list[bpy.types.ID] = [*rendered_objects(layer), *filter(None, [camera_of(scene)])]
     roots += filter(None, [layer.material_override])
     out = {"Render settings": _settings(scene, layer), **of_blocks(roots, then, full)}
     out |= _worked_out(layer)
@@ -172,7 +173,7 @@ def _words(block: bpy.types.ID) -> str:
     return f"{kind} '{block.name}'{library}"
 
 
-def _rendered(layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
+def rendered_objects(layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
     """The objects that a render of the view layer has, also those that the viewport hides."""
     out: dict[int, bpy.types.Object] = {}
 
@@ -218,7 +219,7 @@ def _worked_out(layer: bpy.types.ViewLayer) -> Fingerprint:
     if depsgraph is None or not depsgraph.scene:
         return {}
     out = {}
-    for thing in _rendered(layer):
+    for thing in rendered_objects(layer):
         if not thing.visible_get(view_layer=layer):
             continue
         if thing.session_uid not in _evaluated:

@@ -10,6 +10,7 @@ from ...core.errors import CaptureSetError
 from ...core.region import Region
 from ...core.shot import Shot
 from ..blender.colour import working_space
+from ..blender.markers import camera_of
 from ..stage.stage import picture_region, picture_size
 from . import home, scene_id
 
@@ -30,7 +31,7 @@ def shot_of(
     view_layer: default: `layer_of`; region: default: what the scene renders of its picture.
     """
     width, height = picture_size(scene)
-    camera = scene.camera
+    camera = camera_of(scene)
     region = region or picture_region(scene)
     return Shot(
         scene=scene.name,
@@ -55,9 +56,10 @@ def _matrix(camera: bpy.types.Object) -> tuple[float, ...]:
 
 def _lens(scene: bpy.types.Scene) -> tuple[object, ...]:
     """The settings of camera and render that decide the framing, without the camera's place."""
-    if not scene.camera or scene.camera.type != "CAMERA":
+    camera = camera_of(scene)
+    if not camera or camera.type != "CAMERA":
         return ()
-    lens, render = scene.camera.data, scene.render
+    lens, render = camera.data, scene.render
     kind = lens.type
     names = ["shift_x", "shift_y", "sensor_fit", "sensor_width", "sensor_height"]
     names += {"PERSP": ["lens"], "ORTHO": ["ortho_scale"]}.get(kind, ["panorama_type"])

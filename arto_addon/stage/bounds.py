@@ -39,6 +39,8 @@ class Rendered:
     # a catcher makes instances of them.
     makers: set[Name] = field(default_factory=set)
     made: set[Name] = field(default_factory=set)
+    # drawn: objects that Blender draws over the render of an engine.
+    drawn: list[str] = field(default_factory=list)
 
     def bounds(self) -> tuple[tuple[float, float, float], float]:
         """The centre and radius of all that is seen. Raises SceneError where nothing is."""
@@ -77,6 +79,15 @@ class Rendered:
 def _name(evaluated: bpy.types.Object) -> Name:
     original = evaluated.original
     return original.name, original.library.filepath if original.library else ""
+
+
+def grease_pencil(name: str) -> str:
+    """Say that an object is drawn over the render, and what to do."""
+    return (
+        f"'{name}' is a drawing of Grease Pencil, which Blender draws over the render: hide it "
+        "from the render, or turn Grease Pencil off in this view layer (View Layer properties, "
+        "Filter), render the drawing in a layer of its own, and lay it over the picture"
+    )
 
 
 _found: list[Rendered] = []
@@ -120,6 +131,8 @@ class _BoundsEngine(bpy.types.RenderEngine):
             if corners is None:
                 continue
             seen.note(instance)
+            if instance.object.type == "GREASEPENCIL":
+                seen.drawn.append(instance.object.name)
             world = np.array([instance.matrix_world @ c for c in corners])
             if np.isfinite(world).all():
                 seen.low = np.minimum(seen.low, world.min(axis=0))
@@ -131,7 +144,7 @@ def rendered(stage: Stage) -> Rendered:
     """Find out what the stage's scene renders.
 
     Call this before the hemicube is on the stage, as its planes would count. Raises SceneError
-    where Blender renders nothing.
+    where Blender renders nothing, or draws over the render.
     """
     scene = stage.scene
     render = scene.render
@@ -156,6 +169,8 @@ def rendered(stage: Stage) -> Rendered:
         bpy.utils.unregister_class(_BoundsEngine)
     if not _found:
         raise SceneError("Blender rendered nothing: look for errors in its console")
+    if _found[-1].drawn and scene.view_layers[0].use_grease_pencil:
+        raise SceneError(grease_pencil(_found[-1].drawn[0]))
     return _found[-1]
 
 

@@ -11,6 +11,7 @@ from ...core.capture.head import HEADER as CAPTURE_HEADER
 from ...core.errors import ArtoError, SceneError
 from ...core.field.head import HEADER as FIELD_HEADER
 from ...core.files import Lock
+from ..blender.markers import camera_of
 from ..capture import planes
 from ..capture.capture import capture
 from ..capture.check import check_scene
@@ -105,7 +106,7 @@ def can_capture(cls: type, context: bpy.types.Context) -> bool:
     if context.scene.render.engine != "CYCLES":
         cls.poll_message_set("ARTO captures with Cycles: choose it as the render engine")
         return False
-    if context.scene.camera is None:
+    if camera_of(context.scene) is None:
         cls.poll_message_set("The scene has no camera")
         return False
     return free(cls)

@@ -6,6 +6,7 @@ import bpy
 
 from ...core.capture import kinds
 from ...core.units import clock
+from ..blender.markers import camera_of
 from ..job import session
 from ..job.session import SecondBlender
 from ..job.verbs import Verb
@@ -37,7 +38,8 @@ class ShotPanel(Draws):
     def draw_column(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
         scene = context.scene
         width, height = picture_size(scene)
-        camera = scene.camera.name if scene.camera else "no camera"
+        bound = camera_of(scene)
+        camera = bound.name if bound else "no camera"
         text = tr(
             "{camera}, frame {frame}, {width} x {height}",
             camera=camera,

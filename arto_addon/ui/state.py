@@ -14,6 +14,7 @@ from ...core.errors import ArtoError
 from ...core.field.head import HEADER as FIELD_HEADER
 from ...core.shot import Shot
 from ...core.units import clock, size
+from ..blender.markers import camera_of
 from ..capture.planned import most
 from ..shot import paths, status
 from ..shot.shot import layer_of, shot_of
@@ -48,7 +49,7 @@ def told(scene: bpy.types.Scene) -> Told:
     """Find what has been captured of the scene's shot, and what to do next."""
     if scene.render.engine != "CYCLES":
         return Told("blocked", ("ARTO captures with Cycles:", "choose it as the engine"), "Capture")
-    if scene.camera is None:
+    if camera_of(scene) is None:
         return Told("blocked", ("The scene has no camera",), "Capture")
     layer = layer_of(scene)
     try:

@@ -180,7 +180,7 @@ def _rounded(rows: Iterable[Iterable[float]]) -> list[float]:
 
 @contextmanager
 def bare(
-    scene: bpy.types.Scene, view_layer: str, world: bpy.types.World
+    scene: bpy.types.Scene, view_layer: str, world: bpy.types.World | None
 ) -> Iterator[bpy.types.Scene]:
     """Copy a scene with one view layer and nothing in it but a world, at the scene's frame.
 

@@ -124,6 +124,7 @@ def agreement(
     expected: NDArray,
     always: NDArray | float = 0.0,
     different: float = DIFFERENT,
+    white: float = 1.0,
 ) -> Agreement:
     """Compare a picture with the mean of several renders.
 
@@ -139,6 +140,8 @@ def agreement(
         Light that all of them have and that is not compared.
     different : float
         The relative difference from which on a region differs.
+    white : float
+        What a picture shows of a radiance of 1: the exposure of the film.
 
     Returns
     -------
@@ -163,7 +166,7 @@ def agreement(
     n = light.shape[1]
     error = apart.std(axis=1) / np.sqrt(n)
     mean = light.mean(axis=1)
-    total = max(float(truth.mean()), 1e-12)
+    total = max(float(truth.mean()), 1e-12 * white)
     # regions much darker than the picture may be off by a large share of their light
     floor = np.maximum(mean, 0.1 * total)
     differs = (np.abs(apart.mean(axis=1)) > different * floor) & (
@@ -171,5 +174,5 @@ def agreement(
     )
     there = float(mean[differs].sum())
     worst = float(blocks(one).mean(axis=1)[differs].sum()) / there if there > 0 else 1.0
-    dark = float(truth.mean()) < DARK * 3
+    dark = float(truth.mean()) < DARK * 3 * white
     return Agreement(float(one.mean()) / total, worst, float(differs.mean()), dark)

@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 from arto.arto_addon.blender.output import float_exr
 from arto.arto_addon.blender.reached import reached
+from arto.arto_addon.capture.check import check_scene
+from arto.arto_addon.stage.settings import prepare
+from arto.arto_addon.stage.stage import stage
 from arto.arto_addon.world import images, kept
 from arto.arto_addon.world.check import check_world
 from arto.arto_addon.world.still import still
@@ -162,6 +165,34 @@ def test_a_world_drawn_by_the_pixel_of_a_panorama_is_refused(scene):
     _show(scene.world, _coordinates("Window")(scene, scene.world.node_tree))
     with pytest.raises(SceneError, match="Window coordinates"):
         check_world(scene)
+
+
+def test_a_world_whose_light_ends_is_refused(scene):
+    scene.world.cycles.max_bounces = scene.cycles.max_bounces - 1
+    with pytest.raises(SceneError, match="ends after 11 bounces"):
+        check_world(scene)
+    with pytest.raises(SceneError, match="ends after 11 bounces"):
+        check_scene(scene)
+    scene.world.cycles.max_bounces += 1
+    check_scene(scene)
+
+
+def test_materials_find_the_worlds_properties_on_the_stage(scene):
+    """An Attribute node and a driver find them by the scene, whose world is black there."""
+    scene.world["warmth"] = 0.5
+    scene.world.keyframe_insert('["warmth"]', frame=1)
+    scene.world["warmth"] = 0.9
+    scene.world.keyframe_insert('["warmth"]', frame=11)
+    scene.frame_set(6)
+    with stage(scene, scene.view_layers[0].name) as on:
+        prepare(on, layers=0)
+        assert not len(on.scene.world.node_tree.nodes)
+        on.scene.frame_set(6)
+        layer = on.scene.view_layers[0]
+        layer.update()
+        shown = on.scene.world.evaluated_get(layer.depsgraph)
+        np.testing.assert_allclose(shown["warmth"], 0.7, atol=1e-6)
+    assert scene.world.name == "World" and len(bpy.data.worlds) == 1
 
 
 def test_what_is_around_a_world_is_in_its_key(scene):
