@@ -16,6 +16,7 @@ from ...core.capture.tile_entry import MOST_SAMPLES, checked_sums, fitted_name
 from ...core.errors import FarmError
 from ...core.field.writer import tile_names
 from ...core.values import Values
+from ..settings.table import SETTINGS
 from ..stage.takes import TAKES
 
 FORMAT = "ARTO farm job"
@@ -109,12 +110,17 @@ class JobHead:
         catchers = _frames(said, "catchers")
         if not set(catchers) <= set(frames):
             raise said.wrong("catchers", list(catchers))
+        settings = said.kind("settings", dict, {})
+        for setting in SETTINGS:
+            value = settings.get(setting.name)
+            if setting.name in settings and not setting.can_be(value):
+                raise said.wrong(f"settings.{setting.name}", value)
         subframe = said.real("subframe", 0.0, 1.0)
         head = JobHead(
             blend=said.some_text("blend") or "",
             scene=said.some_text("scene") or "",
             view_layer=said.some_text("view_layer") or "",
-            settings=said.kind("settings", dict, {}),
+            settings=settings,
             frames=frames,
             tiles=said.whole("tiles", 1, MOST),
             seeds=said.whole("seeds", 1, MOST),
@@ -125,6 +131,8 @@ class JobHead:
         )
         if head.parts > MOST:
             raise said.wrong("tiles", head.tiles)
+        if said.data.get("parts", head.parts) != head.parts:
+            raise said.wrong("parts", said.data["parts"])
         return head
 
     def to_json(self) -> dict[str, object]:
@@ -161,8 +169,10 @@ _WRITTEN = ("format", "version", "parts")
 def _frames(said: Values, name: str) -> tuple[int, ...]:
     """A list of frames; empty where the entry is missing."""
     found = said.kind(name, list, [])
-    if len(found) > MOST or any(
-        type(frame) is not int or abs(frame) > LARGEST_FRAME for frame in found
+    if (
+        len(found) > MOST
+        or any(type(frame) is not int or abs(frame) > LARGEST_FRAME for frame in found)
+        or len(set(found)) < len(found)
     ):
         raise said.wrong(name, found)
     return tuple(found)

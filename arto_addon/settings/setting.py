@@ -22,6 +22,9 @@ Panel = Literal["Shot", "Light", "Result", "Quality", "Layers", "Storage", "Meth
 # Identifier, name, description.
 Item = tuple[str, str, str]
 
+# The largest numbers that Blender's properties hold.
+_LARGEST = {"whole": 2**31 - 1, "number": 3.4e38}
+
 
 class Decides(Enum):
     """Whether a new value of a setting makes a new capture or a new plate, and what the key has.
@@ -114,3 +117,25 @@ class Setting:
     soft_most: float | None = None
     subtype: str = ""
     hidden: bool = False
+
+    def can_be(self, value: object) -> bool:
+        """Whether a value, as a description has it, is one that the setting can have.
+
+        Several items of `choices` are a list. No description has an image or a list of entries.
+        """
+        if self.kind == "switch":
+            return isinstance(value, bool)
+        if self.kind == "text":
+            return isinstance(value, str)
+        items = {identifier for identifier, _, _ in self.items}
+        if self.kind == "choice":
+            return isinstance(value, str) and value in items
+        if self.kind == "choices":
+            return isinstance(value, list) and all(isinstance(x, str) and x in items for x in value)
+        if self.kind not in _LARGEST or isinstance(value, bool):
+            return False
+        if not isinstance(value, int if self.kind == "whole" else int | float):
+            return False
+        least = -_LARGEST[self.kind] if self.least is None else self.least
+        most = _LARGEST[self.kind] if self.most is None else self.most
+        return least <= value <= most
