@@ -298,8 +298,9 @@ class ProgressLines:
         self.begun = time.perf_counter()
 
     def __call__(self, step: Progress | Render) -> None:
-        now = (step.text, int(step.share * 10))
+        text = f"WARNING: {step.text}" if isinstance(step, Warned) else step.text
+        now = (text, int(step.share * 10))
         if now != self.last:
             self.last = now
             seconds = time.perf_counter() - self.begun
-            print(f"ARTO {self.name}: {step.share:4.0%} {step.text} ({seconds:.1f} s)", flush=True)
+            print(f"ARTO {self.name}: {step.share:4.0%} {text} ({seconds:.1f} s)", flush=True)

@@ -76,11 +76,12 @@ def capture_frames(
 
 
 def look(
-    scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]
+    scene: bpy.types.Scene, view_layer: str, frames: Sequence[int], place: bool = True
 ) -> Steps[dict[int, ArtoError]]:
     """Look at what the capture of some frames needs -> what is wrong, by frame.
 
-    The scene is left at the last frame.
+    place: whether the captures are written to the shots' own folders. The scene is left at the last
+    frame.
     """
     wrong: dict[int, ArtoError] = {}
     for number, frame in enumerate(frames):
@@ -89,7 +90,8 @@ def look(
         try:
             check_scene(scene, view_layer)
             check_patterns(scene)
-            check_place(scene, view_layer)
+            if place:
+                check_place(scene, view_layer)
         except ArtoError as e:
             wrong[frame] = e
     return wrong

@@ -20,69 +20,115 @@ from ...core.field.field import proxy_folder
 from ...core.field.proxy import FACTORS
 from ...core.files import PART, Lock
 from ...core.fit.fit import fit_into
+from ..capture import room
 from ..capture.capture import check_file, plan_of
+from ..capture.check import check_place
 from ..capture.resume import empty_take, finish, finish_field, let_go
 from ..capture.stream import Stream
 from ..fit.guides import cleaned
 from ..shot import paths, scene_id
 from ..shot.shot import shot_of
 from ..stage.takes import TAKES
-from ..work import Progress, Steps, retold
+from ..work import PLAIN, Batch, Progress, Steps, Wrote, attempted, looked, of_piece, retold
 from .head import Part
-from .job import Job
+from .job import Job, estimate
 
 
-def gather(job_folder: Path) -> Steps[list[Path]]:
+def gather(job_folder: Path, batch: Batch = PLAIN) -> Steps[list[Path]]:
     """Join the parts of a job; returns the folders of the frames' fields.
 
     The fields of each frame and of its takes replace those of the shot. Images of several seeds are
-    averaged, weighted by their samples. Raises FarmError, which names what is missing, before
-    anything is changed.
+    averaged, weighted by their samples. batch: what a frame with missing parts, and a warning,
+    mean. Raises FarmError, which names what is missing, before anything is changed.
     """
     job = Job(job_folder)
-    sets = {
-        (frame, take): job.set_of(frame, take)
-        for frame in job.head.frames
-        for take in job.takes(frame)
-        if not _gathered(job, frame, take)
-    }
-    found = {
-        p: _found(job, p, sets[p.frame, p.take]) for p in job.parts if (p.frame, p.take) in sets
-    }
-    missing = [p for p, there in found.items() if there is None]
-    if missing:
-        numbers = ", ".join(str(p.number) for p in missing[:20])
-        raise FarmError(
-            f"{len(missing)} of {len(job.parts)} parts are not there ({numbers}"
-            f"{', ...' if len(missing) > 20 else ''}): render them, and gather again"
-        )
-    folders = []
+    there: dict[int, _Frame] = {}
+    wrong: dict[str, ArtoError] = {}
+    folders: list[Path] = []
     with job.scene() as (scene, view_layer):
-        for i, frame in enumerate(job.head.frames):
-            yield Progress(i / len(job.head.frames), f"gathering frame {frame}")
+        for frame in job.head.frames:
+            try:
+                there[frame] = _looked_at(job, frame)
+                job.go_to(scene, frame)
+                check_place(scene, view_layer)
+                _check_room(scene, view_layer, there[frame])
+            except ArtoError as e:
+                wrong[f"frame {frame}"] = e
+        yield from looked(wrong, len(job.head.frames), "frames", batch)
+        left = [frame for frame in there if f"frame {frame}" not in wrong]
+        for i, frame in enumerate(left):
+            share = i / len(left)
+            yield Progress(share, f"gathering frame {frame}")
             job.go_to(scene, frame)
-            claimed = paths.claim(scene, view_layer)
-            left = [take for take in job.takes(frame) if (frame, take) in sets]
-            with Lock(claimed, f"gathering {shot_of(scene, view_layer).title}"):
-                for take in left:
-                    parts = {
-                        p: t for p, t in found.items() if t and (p.frame, p.take) == (frame, take)
-                    }
-                    yield from _joined(job, frame, take, parts)
-                # put all takes in place at the end, the first take last, as `capture` does
-                for take in reversed(left):
-                    yield from _placed(scene, job.set_folder(frame, take), claimed / take)
-                if left and frame not in job.catchers:
-                    for take in TAKES:
-                        empty_take(claimed / take)
-            folders.append(claimed / "field")
+            steps = of_piece(_gather(job, scene, view_layer, there[frame]), f"frame {frame}")
+            folder = yield from attempted(steps, f"frame {frame}", share, batch)
+            folders += [folder] if folder else []
     paths.forget()
     parts = job.folder / "parts"
     for partial in list(parts.iterdir()) if parts.is_dir() else []:
         if partial.name.endswith(PART):
             marked.remove_quietly(partial, "part", parts)
+    if not folders:
+        raise FarmError("none of the frames could be gathered: see what was said of each")
     yield Progress(1.0, f"gathered {len(job.parts)} parts into {len(folders)} fields")
     return folders
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """What there is of a frame that is to be gathered: its capture sets, and its parts."""
+
+    frame: int
+    sets: Mapping[Take, CaptureSet]
+    parts: Mapping[Part, Found]
+
+
+def _looked_at(job: Job, frame: int) -> _Frame:
+    """Look at the sets and parts of a frame. Raises ArtoError where something is missing."""
+    sets = {
+        take: job.set_of(frame, take)
+        for take in job.takes(frame)
+        if not _gathered(job, frame, take)
+    }
+    wanted = [part for part in job.parts if part.frame == frame and part.take in sets]
+    found = {part: _found(job, part, sets[part.take]) for part in wanted}
+    if missing := [part for part, there in found.items() if there is None]:
+        numbers = ", ".join(str(part.number) for part in missing[:20])
+        raise FarmError(
+            f"{len(missing)} of {len(wanted)} parts are not there ({numbers}"
+            f"{', ...' if len(missing) > 20 else ''}): render them, and gather again"
+        )
+    return _Frame(frame, sets, {part: there for part, there in found.items() if there})
+
+
+def _check_room(scene: bpy.types.Scene, view_layer: str, there: _Frame) -> None:
+    """Raise SceneError where a frame must be copied to another disk that has no room for it."""
+    place = paths.place(scene, view_layer).folder
+    near = place
+    while not near.exists() and near != near.parent:
+        near = near.parent
+    for captured in there.sets.values():
+        if captured.folder.stat().st_dev != near.stat().st_dev:
+            needed = estimate(captured.head, not captured.kept).kept
+            room.check_disk(place, needed, f"frame {there.frame}")
+
+
+def _gather(job: Job, scene: bpy.types.Scene, view_layer: str, there: _Frame) -> Steps[Path]:
+    """Join the parts of a frame -> the folder of its field."""
+    frame = there.frame
+    claimed = paths.claim(scene, view_layer, job.head.frames)
+    with Lock(claimed, f"gathering {shot_of(scene, view_layer).title}"):
+        for take in there.sets:
+            parts = {part: found for part, found in there.parts.items() if part.take == take}
+            yield from _joined(job, frame, take, parts)
+        # put all takes in place at the end, the first take last, as `capture` does
+        for take in reversed(list(there.sets)):
+            yield from _placed(scene, job.set_folder(frame, take), claimed / take)
+        if there.sets and frame not in job.catchers:
+            for take in TAKES:
+                empty_take(claimed / take)
+    yield Wrote(1.0, f"gathered frame {frame}", claimed / "field")
+    return claimed / "field"
 
 
 def _gathered(job: Job, frame: int, take: Take) -> bool:

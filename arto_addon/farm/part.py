@@ -27,7 +27,7 @@ from ..capture.capture import plan_of, render_tile, set_tile
 from ..capture.check import check_scene
 from ..capture.planned import Given
 from ..capture.stream import Stream
-from ..work import Progress, Steps, retold
+from ..work import Progress, Steps, Wrote, retold
 from .head import Part, PartHead, write_part
 from .job import Job, estimate
 
@@ -43,10 +43,12 @@ def render_part(job_folder: Path, number: int) -> Steps[Path]:
     captured = job.set_of(part.frame, part.take)
     folder = job.part_folder(part)
     if job.there(part, captured.head.key):
-        yield Progress(1.0, f"{part.name} is there")
+        yield Wrote(1.0, f"{part.name} is there", folder)
         return folder
     fitted = job.head.seeds == 1 and not captured.kept
-    room.check_memory(estimate(captured.head, fitted).memory, part.name)
+    needed = estimate(captured.head, fitted)
+    room.check_memory(needed.memory, part.name)
+    room.check_disk(folder, needed.disk // max(job.head.tiles, 1), part.name)
     begun = time.perf_counter()
     partial: Path | None = None
     try:
@@ -76,7 +78,7 @@ def render_part(job_folder: Path, number: int) -> Steps[Path]:
     finally:
         if partial:
             marked.remove_quietly(partial, "part", folder.parent)
-    yield Progress(1.0, f"rendered {part.name}")
+    yield Wrote(1.0, f"rendered {part.name}", folder)
     return folder
 
 

@@ -25,10 +25,10 @@ from ..capture.beside import given_by
 from ..capture.check import check_scene
 from ..capture.patterns import patterns_of
 from ..capture.planned import Given
-from ..capture.sequence import frame_kept, together
+from ..capture.sequence import frame_kept, look, together
 from ..shot import home
 from ..stage.takes import TAKES, WHOLE
-from ..work import Progress, Steps
+from ..work import PLAIN, Progress, Steps, Wrote, looked
 from . import job, templates
 from .head import HEADER, is_job
 
@@ -59,6 +59,13 @@ def plan(
             "another folder"
         )
     check_choice(scene.arto.support, patterns_of(scene.arto), scene.arto.separate)
+    check_scene(scene, view_layer)
+    _check_place(folder)
+    if frames is not None:
+        with frame_kept(scene):
+            wrong = yield from look(scene, view_layer, frames, place=False)
+        named = {f"frame {frame}": error for frame, error in wrong.items()}
+        yield from looked(named, len(frames), "frames", PLAIN)
     _make_way(folder, [scene.frame_current] if frames is None else list(frames))
     # as with `capture`, a single frame keeps its subframe; as with `capture_frames`, several do not
     several = frames is not None
@@ -95,7 +102,20 @@ def plan(
         f"planned {len(made.parts)} parts: {len(frames)} frames{takes}, {tiles} tiles, {seeds} "
         f"seeds; {size(needed)} of disk until they are gathered{told}",
     )
+    yield Wrote(1.0, f"the job is in {folder}", folder)
     return folder
+
+
+def _check_place(folder: Path) -> None:
+    """Raise FarmError where nothing can be written into a job's folder."""
+    there = folder
+    while not os.path.lexists(there) and there != there.parent:
+        there = there.parent
+    if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
+        raise FarmError(
+            f"nothing can be written into {folder}: see who may write there, or plan into another "
+            "folder"
+        )
 
 
 def _make_way(folder: Path, frames: list[int]) -> None:

@@ -37,7 +37,7 @@ class Together:
         self.plate = plate
         self.written: list[Path] = []
         self.removed: list[Path] = []
-        known = (prefix, _older_prefix(plate))
+        known = (prefix, older_prefix(plate))
         self._prefixes = {name for name in known if name is not None}
         self._held = ExitStack()
         self._partial: Path | None = None
@@ -80,7 +80,7 @@ class Together:
                 self.removed.append(path)
 
 
-def _older_prefix(plate: Path) -> str | None:
+def older_prefix(plate: Path) -> str | None:
     """The prefix of the files of layers beside the plate that is there now."""
     if not plate.is_file():
         return None

@@ -12,7 +12,6 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-import shutil
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +19,6 @@ from pathlib import Path
 
 import bpy
 
-from ...core import marked
 from ...core.capture.head import HEADER as CAPTURE_HEADER
 from ...core.description import Description
 from ...core.errors import ArtoError, SceneError, ShotError
@@ -29,7 +27,6 @@ from ...core.files import settle, write_text
 from ...core.regular import read_regular
 from ...core.shot import Shot
 from ...core.signed import text_of
-from ..stage.takes import TAKES
 from . import home
 from . import scene_id as scene_ids
 from .shot import shot_of
@@ -179,6 +176,29 @@ def nearest(scene: bpy.types.Scene, view_layer: str | None = None) -> Shot | Non
     return min(found, key=lambda f: f[:3])[3] if found else None
 
 
+def all_in(folder: Path) -> list[tuple[Path, Shot]]:
+    """Find the captured shots in a folder: the shot whose own folder it is, or those below."""
+    found = []
+    for depth in ("", "*/", "*/*/", "*/*/*/"):
+        for header in sorted(folder.glob(depth + HEADER)):
+            there = _shot_in(header.parent)
+            if there and _anything_in(header.parent):
+                found.append((header.parent, there[0]))
+    return found
+
+
+def alike(scene: bpy.types.Scene, view_layer: str) -> list[Path]:
+    """Find captured shots of scenes with this one's name that are not known to be of this scene.
+
+    They are of its camera and view layer. Raises SceneError, OSError.
+    """
+    shot = shot_of(scene, view_layer)
+    names = shot.scene, shot.view_layer, shot.camera
+    found = [(p, s) for p, s in all_in(_root(scene)) if not _same_scene(shot, s)]
+    some = [(p, s) for p, s in found if (s.scene, s.view_layer, s.camera) == names]
+    return [path for path, _ in sorted(some, key=lambda each: abs(each[1].frame - shot.frame))]
+
+
 def frames(scene: bpy.types.Scene, view_layer: str) -> dict[float, bool]:
     """Find the frames of which a capture was begun -> by frame, whether there is a field.
 
@@ -301,45 +321,3 @@ def worlds_folder(scene: bpy.types.Scene) -> Path:
 def forget() -> None:
     """Forget what the disk looked like, so that the next question looks again."""
     _found.clear()
-
-
-def adopt(scene: bpy.types.Scene, view_layer: str, source: Path) -> Path:
-    """Use what is in `source` for this shot too; returns the shot's own folder.
-
-    Files are hard links where the disk allows links, which take no room, and copies elsewhere.
-    Links are safe because ARTO replaces such files and never changes them. Raises SceneError.
-    """
-    folder = claim(scene, view_layer)
-    for name in _KINDS:
-        if (source / name).is_dir() and not (folder / name).exists():
-            partial: Path | None = None
-            try:
-                partial = marked.scratch(folder / name, _KINDS[name])
-                _share(source / name, partial)
-                partial.rename(folder / name)
-            except OSError as e:
-                if partial:
-                    marked.remove_quietly(partial, _KINDS[name], folder)
-                raise SceneError(f"{source / name} cannot be taken over ({e}): make room") from e
-    _found.clear()
-    return folder
-
-
-# The folders of a shot that another shot may use.
-_KINDS: dict[str, marked.Kind] = {
-    "capture": "capture",
-    "field": "field",
-    **dict.fromkeys(TAKES, "take"),
-}
-
-
-def _share(source: Path, target: Path) -> None:
-    def link(a: str, b: str) -> str:
-        try:
-            os.link(a, b)
-        except OSError:
-            shutil.copy2(a, b)
-        return b
-
-    marks = shutil.ignore_patterns(marked.MARK)  # The target has its own mark.
-    shutil.copytree(source, target, copy_function=link, ignore=marks, dirs_exist_ok=True)

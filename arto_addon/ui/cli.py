@@ -1,19 +1,22 @@
 """The command line: `blender scene.blend --command arto VERB`.
 
-The verbs do what the buttons do, with settings as options. Others do the parts of a farm's job.
+The verbs do what the buttons do, with settings as options. Others do the parts of a farm's job, or
+say what there is of a shot.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
-import re
+import os
 import sys
+import traceback
 from pathlib import Path
+from typing import Any
 
 import bpy
 
-from ...core.errors import ArtoError, CancelledError
+from ...core.errors import ArtoError, SceneError
+from ...core.files import write_text
 from ..capture.capture import capture, estimate
 from ..capture.sequence import capture_frames
 from ..farm.gather import gather
@@ -24,113 +27,33 @@ from ..job import run as job
 from ..live import maps
 from ..relight.many import relight_frames, relight_many
 from ..relight.relight import relight
-from ..settings import table
-from ..settings.setting import Setting
-from ..shot import paths
-from ..work import Progress, ProgressLines, Render, Steps, run
+from ..shot import home, paths, scene_id
+from ..shot.adopting import adopt, adopt_from
+from ..work import Batch, ProgressLines, Steps, run, strictly
+from .inventory import FORMAT, Inventory, inventory
+from .options import parser
+from .report import CODES, OpenJDLines, OptionError, Report, check_file
 
 _commands: list[object] = []
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="blender SCENE.blend --command arto",
-        description="Capture how the scene answers light, fit it, and relight it with its world.",
-        epilog="Exit codes: 0 done, 1 failed, 2 wrong options, 130 cancelled.",
-    )
-    jobs = parser.add_subparsers(dest="verb", required=True)
-    files = argparse.ArgumentParser(add_help=False)
-    files.add_argument("--scene", help="name of the scene (default: the .blend's)")
-    files.add_argument("--view-layer", help="name of the view layer (default: the scene's)")
-    files.add_argument("--folder", help="where capture set and field are kept (default: //arto/)")
-    for name, text, settings in (
-        ("capture", "render the basis images", table.options("hemicube", "capture")),
-        ("fit", "fit the reflectance field", table.options("fit")),
-        ("relight", "relight with the scene's world", table.options("relight")),
-        ("adopt", "use what was captured for another file or scene", ()),
-        (
-            "plan",
-            "plan a capture by many machines",
-            table.options("hemicube", "capture", "fit"),
-        ),
-    ):
-        one = jobs.add_parser(name, parents=[files], help=text)
-        for setting in settings:
-            _add_option(one, setting)
-        if name in ("capture", "relight", "plan"):
-            one.add_argument(
-                "--frames",
-                type=_frames,
-                default=None,
-                help="first and last frame, and a step: 1-24, 1-100:5 (a field for each, "
-                "or a picture)",
-            )
-        if name == "capture":
-            one.add_argument(
-                "--estimate",
-                action="store_true",
-                help="say what it takes, as JSON in the last line, and render nothing long",
-            )
-        if name == "relight":
-            one.add_argument(
-                "--worlds", nargs="+", type=Path, help="environment maps, in the world's place"
-            )
-            one.add_argument(
-                "--turntable", type=int, default=1, help="so many pictures, turned once around"
-            )
-        if name == "plan":
-            one.add_argument("--job", type=Path, required=True, help="the folder to plan into")
-            one.add_argument("--tiles", type=int, help="tiles a frame (default: by the memory)")
-            one.add_argument(
-                "--seeds", type=int, default=1, help="renders of each, whose light is averaged"
-            )
-    for name, text in (("part", "render a part of a job"), ("gather", "join a job's parts")):
-        one = jobs.add_parser(name, help=text)
-        if name == "part":
-            one.add_argument("number", type=int, help="of the part, from 0")
-            one.add_argument(
-                "--save-blend",
-                action="store_true",
-                help="save it for a Blender without ARTO to render, and render nothing",
-            )
-        one.add_argument("--job", type=Path, required=True, help="the folder of the job")
-        one.add_argument(
-            "--openjd", action="store_true", help="say the progress as Open Job Description has it"
-        )
-    # these two are started by the window
-    jobs.add_parser("job").add_argument("task", type=Path)
-    jobs.add_parser("maps")
-    return parser
+def command(arguments: list[str]) -> int:
+    """What Blender calls for `--command arto`; returns the exit code.
 
-
-def _frames(text: str) -> range:
-    """The frames that a text names, as in `1-24`, `1-100:5` or `7`."""
-    match = re.fullmatch(r"(-?\d+)(?:-(-?\d+))?(?::(\d+))?", text)
-    first, last, step = match.groups() if match else ("0", "-1", "1")
-    found = range(int(first), int(last or first) + 1, int(step or 1) or 1)
-    if not found:
-        raise argparse.ArgumentTypeError(f"'{text}' is no frame range: write 1-24, or 1-100:5")
-    return found
-
-
-def _add_option(parser: argparse.ArgumentParser, setting: Setting) -> None:
-    """Add an option for a setting, with the setting's kind, choices and description."""
-    flag, words = f"--{setting.name.replace('_', '-')}", setting.words.replace("%", "%%")
-    if setting.kind in ("choice", "choices"):
-        items = [identifier for identifier, _, _ in setting.items]
-        several = "+" if setting.kind == "choices" else None
-        parser.add_argument(flag, help=words, choices=items, nargs=several)
-    elif setting.kind == "switch":
-        parser.add_argument(flag, help=words, action=argparse.BooleanOptionalAction)
-    else:
-        kind = {"whole": int, "number": float, "text": str}[setting.kind]
-        parser.add_argument(flag, help=words, type=kind)
+    Blender says more on standard output after this, and what it has kept back comes then too. It
+    goes to the standard error, so that the last line is ARTO's.
+    """
+    code = main(arguments)
+    sys.stdout.flush()
+    if bpy.app.background and bpy.app.binary_path:
+        os.dup2(2, 1)
+    return code
 
 
 def main(arguments: list[str]) -> int:
     """Run the verb that the arguments name; returns the exit code."""
     try:
-        options = vars(_parser().parse_args(arguments))
+        options = vars(parser().parse_args(arguments))
     except SystemExit as e:
         return int(e.code or 0)
     verb = options.pop("verb")
@@ -138,115 +61,192 @@ def main(arguments: list[str]) -> int:
         return job.main(options["task"])
     if verb == "maps":
         return maps.serve()
+    try:
+        if verb == "status":
+            return _status(options)
+        lines = OpenJDLines() if options.get("openjd") else ProgressLines(verb)
+        file = options.pop("json", None)
+        report = Report(verb, file.resolve() if file else None, lines)
+    except (ArtoError, OptionError) as e:
+        print(f"ARTO: {e}", file=sys.stderr)
+        return CODES["wrong options" if isinstance(e, OptionError) else "failed"]
+    try:
+        _do(verb, options, report)
+    except (ArtoError, OptionError) as e:
+        if options.get("openjd"):
+            print(f"openjd_fail: {e}", flush=True)
+        return report.ended(e)
+    except Exception as e:
+        traceback.print_exc()
+        return report.ended(e)
+    return report.ended()
+
+
+def _do(verb: str, options: dict[str, Any], report: Report) -> None:
+    """Do a verb's work. Raises ArtoError, OptionError."""
+    batch = Batch(options.pop("keep_going", False), options.pop("strict", False))
     if verb in ("part", "gather"):
-        return _of_a_farm(
-            options["job"].resolve(),
-            None if verb == "gather" else options["number"],
-            openjd=options["openjd"],
-            save_blend=verb == "part" and options["save_blend"],
+        _of_a_farm(verb, options, report, batch)
+        return
+    scene, layer = _scene(options)
+    source, saves = options.pop("source", None), options.pop("save", False)
+    if saves:
+        _save(scene, layer, options.get("folder"))
+    named = scene_id.of(scene)
+    frames, only_estimate = options.pop("frames", None), options.pop("estimate", False)
+    planned = {name: options.pop(name, None) for name in ("job", "tiles", "seeds")}
+    worlds, turns = options.pop("worlds", None), options.pop("turntable", 1)
+    _set(scene, options)
+    if verb == "adopt":
+        _adopt(scene, layer, source)
+        return
+    if verb == "capture" and only_estimate:
+        found = run(estimate(scene, layer), report)
+        print(json.dumps(found.to_json()), flush=True)
+        return
+    work: Steps[object]
+    if verb == "plan":
+        folder = planned["job"].resolve()
+        work = plan(scene, layer, folder, frames, planned["tiles"], planned["seeds"])
+    elif verb == "capture" and frames:
+        work = capture_frames(scene, layer, frames, batch)
+    elif verb == "relight" and frames and not worlds and turns == 1:
+        work = relight_frames(scene, layer, frames, batch)
+    elif verb == "relight" and (worlds or frames or turns > 1):
+        files = [w.resolve() for w in worlds or ()]
+        work = relight_many(scene, layer, files, turns, frames or (), batch)
+    else:
+        work = {"capture": capture, "fit": fit, "relight": relight}[verb](scene, layer)
+    # of many, each piece is strict by itself
+    run(strictly(work) if batch.strict and not batch.keep_going else work, report)
+    if verb == "capture" and named is None:
+        print(
+            "ARTO capture: the .blend was saved without the ID by which this capture is found when "
+            "the file has another name: save it with --save, or use the capture there by "
+            f"--command arto adopt --from '{paths.place(scene, layer).folder}'",
+            flush=True,
         )
+
+
+def _scene(options: dict[str, Any]) -> tuple[bpy.types.Scene, str]:
+    """The scene and the view layer that the options name. Raises OptionError."""
     name, layer = options.pop("scene"), options.pop("view_layer")
     scene = bpy.data.scenes.get(name) if name else bpy.context.scene
     if scene is None:
-        print(f"ARTO: there is no scene '{name}'", file=sys.stderr)
-        return 2
+        raise OptionError(f"there is no scene '{name}'")
     if layer is None:
         layer = scene.view_layers[0].name
         if scene == bpy.context.scene:
             layer = bpy.context.view_layer.name
     elif layer not in scene.view_layers:
-        print(f"ARTO: the scene has no view layer '{layer}'", file=sys.stderr)
-        return 2
-    for path in ("folder", "output"):
+        raise OptionError(f"the scene has no view layer '{layer}'")
+    for path in ("folder", "output", "cryptomatte"):
         given = options.get(path)
         if given and not given.startswith("//"):
-            options[path] = str(Path(given).resolve())
+            # a slash at the end says that the output is a folder
+            end = "/" if given.endswith(("/", "\\")) else ""
+            options[path] = str(Path(given).resolve()) + end
     if options.get("faces"):
         options["faces"] = set(options["faces"])
         options["preset"] = "custom"
-    frames, only_estimate = options.pop("frames", None), options.pop("estimate", False)
-    planned = {name: options.pop(name, None) for name in ("job", "tiles", "seeds")}
-    worlds, turns = options.pop("worlds", None), options.pop("turntable", 1)
+    return scene, layer
+
+
+def _set(scene: bpy.types.Scene, options: dict[str, Any]) -> None:
+    """Give the scene the settings of the options. Raises OptionError where one is out of range."""
     for key, value in options.items():
-        if value is not None:
+        if value is None:
+            continue
+        flag = f"--{key.replace('_', '-')}"
+        try:
             setattr(scene.arto, key, value)
-            taken = getattr(scene.arto, key)
-            if isinstance(value, int | float) and abs(taken - value) > 1e-6 * abs(value):
-                option = key.replace("_", "-")
-                print(f"ARTO: --{option} {value} is out of range", file=sys.stderr)
-                return 2
-    try:
-        if verb == "adopt":
-            place = paths.place(scene, layer)
-            if not place.owner:
-                print("ARTO: there is nothing of another file or scene to use", file=sys.stderr)
-                return 1
-            print(f"ARTO adopt: {paths.adopt(scene, layer, place.source)}")
-            return 0
-        if verb == "capture" and only_estimate:
-            found = run(estimate(scene, layer), ProgressLines(verb))
-            print(json.dumps(found.to_json()), flush=True)
-            return 0
-        work: Steps[object]
-        if verb == "plan":
-            tiles, seeds = planned["tiles"], planned["seeds"]
-            if (tiles is not None and tiles < 1) or seeds < 1:
-                print("ARTO: --tiles and --seeds are at least 1", file=sys.stderr)
-                return 2
-            work = plan(scene, layer, planned["job"].resolve(), frames, tiles, seeds)
-        elif verb == "capture" and frames:
-            work = capture_frames(scene, layer, frames)
-        elif verb == "relight" and frames and not worlds and turns == 1:
-            work = relight_frames(scene, layer, frames)
-        elif verb == "relight" and (worlds or frames or turns > 1):
-            files = [w.resolve() for w in worlds or ()]
-            work = relight_many(scene, layer, files, turns, frames or ())
-        else:
-            work = {"capture": capture, "fit": fit, "relight": relight}[verb](scene, layer)
-        run(work, ProgressLines(verb))
-    except ArtoError as e:
-        return _failed(e)
-    return 0
+        except (OverflowError, ValueError) as e:
+            raise OptionError(f"{flag} {value} is out of range") from e
+        taken = getattr(scene.arto, key)
+        if isinstance(value, int | float) and abs(taken - value) > 1e-6 * abs(value):
+            raise OptionError(f"{flag} {value} is out of range")
+        if isinstance(value, str) and taken != value:
+            raise OptionError(f"{flag} is longer than Blender keeps it: shorten it")
 
 
-def _failed(error: ArtoError) -> int:
-    """Print an error; returns the exit code."""
-    print(f"ARTO: {error}", file=sys.stderr)
-    return 130 if isinstance(error, CancelledError) else 1
+def _save(scene: bpy.types.Scene, layer: str, folder: str | None) -> None:
+    """Save the .blend with the scene's ID, and without the settings of the options.
 
-
-def _of_a_farm(folder: Path, number: int | None, *, openjd: bool, save_blend: bool) -> int:
-    """Render a part of a farm's job, or gather the parts; returns the exit code.
-
-    The settings are those of the job. number: the part's, None to gather.
+    Raises SceneError.
     """
-    work: Steps[Path | list[Path]]
+    if not home.file():
+        raise SceneError("this .blend was never saved, so --save has no place for it: save it")
+    if scene_id.of(scene):
+        return
+    before = scene.arto.folder
+    if folder:
+        scene.arto.folder = folder
     try:
-        if number is None:
-            work = gather(folder)
-        else:
-            work = (save_part if save_blend else render_part)(folder, number)
-        name = "gather" if number is None else "part"
-        made = run(work, OpenJDLines() if openjd else ProgressLines(name))
-    except ArtoError as e:
-        if openjd:
-            print(f"openjd_fail: {e}", flush=True)
-        return _failed(e)
+        paths.claim(scene, layer)
+    finally:
+        scene.arto.folder = before
+    try:
+        _save_blend()
+    except RuntimeError as e:
+        raise SceneError(f"{home.file()} cannot be saved ({e}): see who may write there") from e
+
+
+def _save_blend() -> None:
+    bpy.ops.wm.save_mainfile()
+
+
+def _adopt(scene: bpy.types.Scene, layer: str, source: Path | None) -> None:
+    """Use what was captured for another file or scene. Raises SceneError."""
+    if source is not None:
+        for frame, folder in adopt_from(scene, layer, source.resolve()):
+            print(f"ARTO adopt: frame {frame}: {folder}", flush=True)
+        return
+    place = paths.place(scene, layer)
+    if not place.owner:
+        others = paths.alike(scene, layer)
+        raise SceneError(
+            "there is nothing of another file or scene to use"
+            + (f": name it, as in --from '{others[0]}'" if others else "")
+        )
+    print(f"ARTO adopt: {adopt(scene, layer, place.source)}", flush=True)
+
+
+def _of_a_farm(verb: str, options: dict[str, Any], report: Report, batch: Batch) -> None:
+    """Render a part of a farm's job, or gather the parts. The settings are those of the job."""
+    folder = options["job"].resolve()
+    work: Steps[Path | list[Path]]
+    if verb == "gather":
+        work = gather(folder, batch)
+    else:
+        work = (save_part if options["save_blend"] else render_part)(folder, options["number"])
+    made = run(strictly(work) if batch.strict and not batch.keep_going else work, report)
     for path in made if isinstance(made, list) else [made]:
         # render managers look for this line
         print(f"Saved: '{path}'", flush=True)
-    return 0
 
 
-class OpenJDLines:
-    """Prints progress in the lines that an Open Job Description session reads."""
-
-    def __call__(self, step: Progress | Render) -> None:
-        print(f"openjd_progress: {100 * step.share:.1f}\nopenjd_status: {step.text}", flush=True)
+def _status(options: dict[str, Any]) -> int:
+    """Say what there is of a shot; returns the exit code: 0 where all is whole, else 3."""
+    file, frames = options.pop("json"), options.pop("frames")
+    scene, layer = _scene(options)
+    _set(scene, options)
+    found: Inventory = inventory(scene, layer, frames)
+    text = json.dumps(found.to_json())
+    if file is None:
+        print("\n".join(found.lines), flush=True)
+    elif str(file) == "-":
+        print(text, flush=True)
+    else:
+        check_file(file.resolve(), FORMAT)
+        try:
+            write_text(file.resolve(), text + "\n")
+        except OSError as e:
+            raise OptionError(f"--json {file} cannot be written ({e})") from e
+    return CODES["done" if found.whole else "some failed"]
 
 
 def register() -> None:
-    _commands.append(bpy.utils.register_cli_command("arto", main))
+    _commands.append(bpy.utils.register_cli_command("arto", command))
 
 
 def unregister() -> None:

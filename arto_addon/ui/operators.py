@@ -24,6 +24,7 @@ from ..relight.back import mix_to_scene
 from ..relight.many import frames_of, relight_frames
 from ..relight.relight import relight
 from ..shot import paths
+from ..shot.adopting import adopt
 from ..shot.shot import layer_of
 from ..stage.bounds import scene_bounds
 from ..stage.stage import stage
@@ -264,7 +265,7 @@ class ARTO_OT_adopt(Quick):
         place = paths.place(scene, layer)
         if not place.owner:
             raise SceneError("there is nothing of another file or scene to use here")
-        folder = paths.adopt(scene, layer, place.source)
+        folder = adopt(scene, layer, place.source)
         return f"what was captured for {place.owner} is used here too, in {folder}"
 
 

@@ -59,7 +59,7 @@ def test_parts_are_what_one_machine_makes(farm_scene, tmp_path, monkeypatch):
     rendered = []
     folder = work.run(parts.render_part(job.folder, 0), lambda s: rendered.append(s))
     assert folder == job.folder / "parts" / "part_0000"
-    assert [type(s) for s in rendered] == [work.Progress], "a part that is there is not rendered"
+    assert [type(s) for s in rendered] == [work.Wrote], "a part that is there is not rendered"
     assert not list(job.folder.rglob("*.exr")), "a part keeps what was fitted"
     (job.folder / "parts" / "part_0001.77.part").mkdir()  # of a process that was killed
     (found,) = work.run(gather(job.folder))

@@ -1,0 +1,187 @@
+"""The options of the command line."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+from pathlib import Path
+
+from ..settings import table
+from ..settings.setting import Setting
+
+# The largest number of a frame in Blender, on both sides of 0.
+_LAST_FRAME = 1_048_574
+
+
+def parser() -> argparse.ArgumentParser:
+    """The parser of the command line, with an option for each setting."""
+    out = argparse.ArgumentParser(
+        prog="blender SCENE.blend --command arto",
+        description="Capture how the scene answers light, fit it, and relight it with its world.",
+        epilog="Exit codes: 0 done, 1 failed, 2 wrong options, 3 some failed and the others are "
+        "done (--keep-going), 130 cancelled.",
+    )
+    jobs = out.add_subparsers(dest="verb", required=True)
+    files = argparse.ArgumentParser(add_help=False)
+    files.add_argument("--scene", help="name of the scene (default: the .blend's)")
+    files.add_argument("--view-layer", help="name of the view layer (default: the scene's)")
+    files.add_argument("--folder", help="where capture set and field are kept (default: //arto/)")
+    told = _told()
+    for name, text, settings in (
+        ("capture", "render the basis images", table.options("hemicube", "capture")),
+        ("fit", "fit the reflectance field", table.options("fit")),
+        ("relight", "relight with the scene's world", table.options("relight")),
+        ("plan", "plan a capture by many machines", table.options("hemicube", "capture", "fit")),
+    ):
+        one = jobs.add_parser(name, parents=[files, told], help=text)
+        for setting in settings:
+            _add_option(one, setting)
+        if name != "fit":
+            _add_frames(one, "first and last frame, and a step: 1-24, 1-100:5 (a field for each, "
+                        "or a picture)")  # fmt: skip
+        if name == "capture":
+            one.add_argument(
+                "--estimate",
+                action="store_true",
+                help="say what it takes, as JSON in the last line, and render nothing long",
+            )
+            one.add_argument(
+                "--save",
+                action="store_true",
+                help="save the .blend first, with the ID by which its captures are found when the "
+                "file has another name",
+            )
+        if name == "relight":
+            one.add_argument(
+                "--worlds", nargs="+", type=Path, help="environment maps, in the world's place"
+            )
+            one.add_argument(
+                "--turntable",
+                type=_from_one,
+                default=1,
+                help="so many pictures, turned once around",
+            )
+        if name == "plan":
+            one.add_argument("--job", type=Path, required=True, help="the folder to plan into")
+            one.add_argument(
+                "--tiles", type=_from_one, help="tiles a frame (default: by the memory)"
+            )
+            one.add_argument(
+                "--seeds",
+                type=_from_one,
+                default=1,
+                help="renders of each, whose light is averaged",
+            )
+    _add_adopt(jobs.add_parser("adopt", parents=[files], help="use another file's captures"))
+    _add_status(jobs.add_parser("status", parents=[files], help="say what there is of a shot"))
+    for name, text in (("part", "render a part of a job"), ("gather", "join a job's parts")):
+        one = jobs.add_parser(name, parents=[told], help=text)
+        if name == "part":
+            one.add_argument("number", type=int, help="of the part, from 0")
+            one.add_argument(
+                "--save-blend",
+                action="store_true",
+                help="save it for a Blender without ARTO to render, and render nothing",
+            )
+        one.add_argument("--job", type=Path, required=True, help="the folder of the job")
+        one.add_argument(
+            "--openjd", action="store_true", help="say the progress as Open Job Description has it"
+        )
+    # these two are started by the window
+    jobs.add_parser("job").add_argument("task", type=Path)
+    jobs.add_parser("maps")
+    return out
+
+
+def _told() -> argparse.ArgumentParser:
+    """The options of how failures and warnings count, and where they are told."""
+    out = argparse.ArgumentParser(add_help=False)
+    out.add_argument(
+        "--keep-going",
+        action="store_true",
+        help="where one of many frames or pictures cannot be made, make the others (exit code 3)",
+    )
+    out.add_argument("--strict", action="store_true", help="a warning is an error")
+    out.add_argument(
+        "--json",
+        type=Path,
+        metavar="FILE",
+        help="write down what was written, warned of and failed",
+    )
+    return out
+
+
+def _add_adopt(one: argparse.ArgumentParser) -> None:
+    one.add_argument(
+        "--from",
+        dest="source",
+        type=Path,
+        metavar="FOLDER",
+        help="a shot's folder, or one above several (default: what the scene's ID leads to)",
+    )
+
+
+def _add_status(one: argparse.ArgumentParser) -> None:
+    one.add_argument(
+        "--frames",
+        nargs="?",
+        type=frames,
+        const="all",
+        help="frames to look at; without numbers all that a capture was begun of (default: the "
+        "scene's frame)",
+    )
+    one.add_argument(
+        "--json",
+        nargs="?",
+        type=Path,
+        const=Path("-"),
+        metavar="FILE",
+        help="say it as JSON, in the last line or in a file",
+    )
+
+
+def _add_frames(one: argparse.ArgumentParser, text: str) -> None:
+    one.add_argument("--frames", type=frames, default=None, help=text)
+
+
+def frames(text: str) -> range:
+    """The frames that a text names, as in `1-24`, `1-100:5` or `7`."""
+    match = re.fullmatch(r"(-?\d{1,9})(?:-(-?\d{1,9}))?(?::(\d{1,9}))?", text)
+    first, last, step = (match[1], match[2], match[3]) if match else ("0", "-1", None)
+    count = 1 if step is None else int(step)
+    found = range(int(first), int(last or first) + 1, count) if count else range(0)
+    if not found:
+        raise argparse.ArgumentTypeError(f"'{text}' is no frame range: write 1-24, or 1-100:5")
+    if max(abs(found[0]), abs(found[-1])) > _LAST_FRAME:
+        raise argparse.ArgumentTypeError(f"'{text}': Blender counts frames up to {_LAST_FRAME}")
+    return found
+
+
+def _from_one(text: str) -> int:
+    """A whole number of 1 or more."""
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' cannot be: 1 is the least")
+    return int(text)
+
+
+def _number(text: str) -> float:
+    """A number that is finite."""
+    value = float(text)
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"'{text}' is no number that can be")
+    return value
+
+
+def _add_option(out: argparse.ArgumentParser, setting: Setting) -> None:
+    """Add an option for a setting, with the setting's kind, choices and description."""
+    flag, words = f"--{setting.name.replace('_', '-')}", setting.words.replace("%", "%%")
+    if setting.kind in ("choice", "choices"):
+        items = [identifier for identifier, _, _ in setting.items]
+        several = "+" if setting.kind == "choices" else None
+        out.add_argument(flag, help=words, choices=items, nargs=several)
+    elif setting.kind == "switch":
+        out.add_argument(flag, help=words, action=argparse.BooleanOptionalAction)
+    else:
+        kind = {"whole": int, "number": _number, "text": str}[setting.kind]
+        out.add_argument(flag, help=words, type=kind)
