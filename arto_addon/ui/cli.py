@@ -31,7 +31,7 @@ from ..shot import home, paths, scene_id
 from ..shot.adopting import adopt, adopt_from
 from ..work import Batch, ProgressLines, Steps, run, strictly
 from .inventory import FORMAT, Inventory, inventory
-from .options import parser
+from .options import EVERY_FRAME, parser
 from .report import CODES, OpenJDLines, OptionError, Report, check_file
 
 _commands: list[object] = []
@@ -230,7 +230,7 @@ def _status(options: dict[str, Any]) -> int:
     file, frames = options.pop("json"), options.pop("frames")
     scene, layer = _scene(options)
     _set(scene, options)
-    found: Inventory = inventory(scene, layer, frames)
+    found: Inventory = inventory(scene, layer, "all" if frames == EVERY_FRAME else frames)
     text = json.dumps(found.to_json())
     if file is None:
         print("\n".join(found.lines), flush=True)

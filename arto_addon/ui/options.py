@@ -10,6 +10,8 @@ from pathlib import Path
 from ..settings import table
 from ..settings.setting import Setting
 
+# What stands for all frames that a capture was begun of.
+EVERY_FRAME = range(0)
 # The largest number of a frame in Blender, on both sides of 0.
 _LAST_FRAME = 1_048_574
 
@@ -127,7 +129,7 @@ def _add_status(one: argparse.ArgumentParser) -> None:
         "--frames",
         nargs="?",
         type=frames,
-        const="all",
+        const=EVERY_FRAME,
         help="frames to look at; without numbers all that a capture was begun of (default: the "
         "scene's frame)",
     )
