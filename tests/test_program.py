@@ -295,3 +295,11 @@ def test_interrupted_in_batch(program: Program, scene: Path) -> None:
     assert not list((scene.parent / "arto").rglob("*.exr*"))
     done = program.run(*map(str, capture[len(program.command) :]), "--memory", "16")
     assert done.returncode == 0, said(done)
+
+
+def test_the_last_line_is_the_estimate(program: Program, scene: Path) -> None:
+    """Blender says more when it ends, and keeps some of its lines back until then."""
+    done = program.run("-b", scene, "--command", "arto", "capture", "--estimate")
+    assert done.returncode == 0, said(done)
+    found = json.loads(done.stdout.splitlines()[-1])
+    assert found["renders"] >= 1 and found["disk"] > 0

@@ -131,6 +131,8 @@ def _capture(
     paths.forget()
     caution = f". CAUTION: {head.caution.text}" if head.caution else ""
     text = f"captured {len(head.hemicube)} patches{caution}"
+    if not head.kept:
+        yield Wrote(1.0, text, claimed / "field")
     yield Wrote(1.0, text, claimed / "capture")
     return claimed / "capture"
 

@@ -114,6 +114,7 @@ def save_part(job_folder: Path, number: int) -> Steps[Path]:
                 write_to(this.on.scene.render, Path(f"//{part.name}_{i:02d}_####.exr"))
                 _save_alone(this.on.scene, path)
             saved.append(path)
+            yield Wrote((i + 1) / len(plan_of(captured.head)), f"saved {path.name}", path)
     yield Progress(1.0, f"saved {len(saved)} files of {part.name}")
     return saved[0]
 

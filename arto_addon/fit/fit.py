@@ -15,7 +15,7 @@ from ..fit.guides import cleaned
 from ..shot import paths, status
 from ..shot.shot import check_same_shot, layer_of, shot_of
 from ..stage import takes
-from ..work import Progress, Steps
+from ..work import Progress, Steps, Wrote
 
 
 def _is_fitted(captured: CaptureSet, folder: Path, choice: str, separate: bool) -> bool:
@@ -76,5 +76,6 @@ def fit(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps[Path]:
                 yield from _fit_one(scene, there, target.parent / name / "field")
         yield from _fit_one(scene, captured, target)
     paths.forget()
-    yield Progress(1.0, f"fitted {len(captured.hemicube)} patches of {captured.pixels} pixels")
+    text = f"fitted {len(captured.hemicube)} patches of {captured.pixels} pixels"
+    yield Wrote(1.0, text, target)
     return target

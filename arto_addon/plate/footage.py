@@ -29,7 +29,7 @@ _FILLS = {"STRETCH": "Stretch", "FIT": "Fit", "CROP": "Crop"}
 # Footage is read at most so many times finer than the picture: enough for 8K in a preview.
 _FINEST = 8
 # The properties that an image's user and an image node of the compositor share.
-_TIMING = ("frame_duration", "frame_start", "frame_offset", "use_cyclic", "use_auto_refresh")
+TIMING = ("frame_duration", "frame_start", "frame_offset", "use_cyclic", "use_auto_refresh")
 
 
 @dataclass(frozen=True)
@@ -205,7 +205,7 @@ class Footage:
         node = tree.nodes.new("CompositorNodeImage")
         node.image = self.source
         if self.timing is not None and self.source.source in {"SEQUENCE", "MOVIE"}:
-            for name in _TIMING:
+            for name in TIMING:
                 setattr(node, name, getattr(self.timing, name))
         return node
 

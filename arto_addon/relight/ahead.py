@@ -16,7 +16,7 @@ import bpy
 
 from ...core.errors import ArtoError, CaptureSetError, SceneError, StrictError
 from ...core.units import size
-from ..blender import sequences
+from ..blender import denoise, sequences
 from ..capture.sequence import frame_kept
 from ..plate import mattes, plate
 from ..plate.footage import footage
@@ -30,6 +30,9 @@ from ..world.images import files_at, image_nodes
 from . import layers
 from .shown import Shown
 
+# Said in a warning, and in the header of the plate.
+NO_DENOISER = "no: this Blender was built without Open Image Denoise"
+GLASS = "opaque: what is seen through it is in it, whatever Transparent Glass says"
 # How small compressed files of pictures are, as a share of their pixels, where they are small: a
 # disk that has room for so much may still become full, and one that has not is told of at once.
 _PACKED = 0.5
@@ -210,10 +213,31 @@ def check_frame(shown: Shown, own_world: bool, strict: bool) -> None:
     shown.mattes()
     if own_world:
         check_images(check_world(scene, shown.layer), scene.frame_current)
-    if strict and (changed := shown.changed()):
-        raise StrictError(f"the scene is not the captured one: {'; '.join(changed[:3])}")
-    if strict and own_world and (by_rays := differs_by_rays(check_world(scene, shown.layer))):
-        raise StrictError(f"the world is {by_rays}")
+    if strict:
+        world = check_world(scene, shown.layer) if own_world else None
+        if said := warnings(shown, world):
+            raise StrictError(f"{said[0]} (a warning, and with --strict that is an error)")
+
+
+def warnings(shown: Shown, world: bpy.types.World | None) -> list[str]:
+    """What to warn of before a picture is made, in words. world: that lights it."""
+    scene, out = shown.scene, []
+    if changed := shown.changed():
+        # a warning, not an error: only the artist knows whether the change shows
+        out.append(f"the scene is not the captured one: {'; '.join(changed[:3])}")
+    if world and (by_rays := differs_by_rays(world)):
+        out.append(f"the world is {by_rays}")
+    if said := shown.footage_warning():
+        out.append(said)
+    if scene.arto.denoise and not denoise.available():
+        out.append(f"denoising: {NO_DENOISER}")
+    if scene.render.film_transparent and scene.cycles.film_transparent_glass:
+        out.append(f"glass: {GLASS}")
+    missing = [name for name in plate.DATA if not shown.field.has_layer(name)]
+    if scene.arto.write_data and missing:
+        lacks = f"the data file has no {', '.join(missing)}"
+        out.append(f"{lacks}: it was not captured; capture again to have it")
+    return out
 
 
 def check_picture(

@@ -13,8 +13,8 @@ from ...core.catcher import Caught
 from ...core.exr.writing import Opener
 from ..plate import plate
 from ..plate.together import PLATE, Together
-from ..work import Progress, Steps, Warned, Wrote
-from . import layers
+from ..work import Progress, Steps, Wrote
+from . import ahead, layers
 from .shown import Ready, Shown
 
 
@@ -43,9 +43,7 @@ def write(shown: Shown, ready: Ready, made: Made, about: dict[str, str]) -> Step
     yield Progress(0.9, f"writing {path}")
     about = about | {"lamps": ready.lamps}
     if scene.render.film_transparent and scene.cycles.film_transparent_glass:
-        glass = "opaque: what is seen through it is in it, whatever Transparent Glass says"
-        about["glass"] = glass
-        yield Warned(0.9, f"glass: {glass}")
+        about["glass"] = ahead.GLASS
     about |= {
         "look": ready.lit.look,
         "turn": f"{math.degrees(ready.whole.turn):.4g}" if ready.whole.turn else "",
@@ -91,7 +89,7 @@ def _written(
         missing = plate.write_data(scene, path, shown.field, mattes, about, opener)
         if missing:
             lacks = f"the data file has no {', '.join(missing)}"
-            yield Warned(0.9, f"{lacks}: it was not captured; capture again to have it")
+            yield Progress(0.9, f"{lacks}: it was not captured; capture again to have it")
     if settings.layers != "OFF":
         found = yield from layers.of_plate(shown, ready)
         if not scene.render.film_transparent:

@@ -15,7 +15,7 @@ from ...core.errors import ArtoError
 from ...core.field.field import Field
 from ...core.shot import Shot
 from ..plate import mattes
-from ..plate.footage import footage
+from ..plate.footage import TIMING, footage
 from ..settings.setting import Decides
 from ..settings.table import values
 from ..shot import paths, status, walk
@@ -92,10 +92,20 @@ def _footage(scene: bpy.types.Scene) -> object:
         found = footage(scene)
         if found is None:
             return None
-        file = found.file(scene)
-        space = found.source.colorspace_settings.name
-        of = [found.name, found.fills, space, scene.render.fps, scene.render.fps_base]
-        return [*of, _content(file)] if file else [*of, sorted(of_blocks([found.source]).items())]
+        source, file = found.source, found.file(scene)
+        of = [found.name, found.fills, source.colorspace_settings.name]
+        if file:
+            return [*of, _content(file)]
+        if source.source == "MOVIE" and not getattr(source, "packed_file", None):
+            # of a movie, which may be large, the size and the time
+            of += [
+                scene.render.fps,
+                scene.render.fps_base,
+                walk.file(source.filepath, source.library),
+            ]
+            timing = found.timing if found.timing is not None else source
+            return [*of, *(getattr(timing, name, None) for name in TIMING)]
+        return [*of, walk.image(source)]
     except ArtoError as e:  # the plate cannot be made again, so it is not up to date
         return str(e)
 

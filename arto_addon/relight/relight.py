@@ -94,17 +94,13 @@ def make_ready(shown: Shown, lit: Light) -> Steps[Ready]:
     settings = scene.arto
     world = lit.world or check_world(scene, layer)
     laps = Laps()
-    changed = shown.changed()
-    if changed:
-        # a warning, not an error: only the artist knows whether the change shows
-        yield Warned(0.0, f"the scene is not the captured one: {'; '.join(changed[:3])}")
-    if by_rays := differs_by_rays(world):
-        yield Warned(0.0, f"the world is {by_rays}")
+    changed, by_rays = shown.changed(), differs_by_rays(world)
     # raise before the long work what would be raised after it
     plate.window_of(scene).check(field.shape)
     ahead.check_picture(shown, lit.path, lit.world)
     shown.mattes()
-    if shown.filmed() and (said := shown.footage_warning()):
+    shown.filmed()
+    for said in ahead.warnings(shown, world):
         yield Warned(0.0, said)
     yield Progress(0.0, "bringing the world to an environment map")
     whole = kept.environment(scene, settings.environment_width, layer, lit.world)
@@ -160,8 +156,8 @@ def finish(
             denoised = "Open Image Denoise"
         else:
             # three places say this: this message, the file's header and the last message
-            denoised = "no: this Blender was built without Open Image Denoise"
-            yield Warned(0.7, f"denoising: {denoised}")
+            denoised = ahead.NO_DENOISER
+            yield Progress(0.7, f"denoising: {denoised}")
         lap("denoise")
     for picture, parts in zip(pictures, summed, strict=True):
         picture[..., :3] = sum(parts)

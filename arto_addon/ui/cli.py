@@ -11,7 +11,7 @@ import os
 import sys
 import traceback
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import bpy
 
@@ -35,6 +35,7 @@ from .options import EVERY_FRAME, parser
 from .report import CODES, OpenJDLines, OptionError, Report, check_file
 
 _commands: list[object] = []
+_Made = TypeVar("_Made")
 
 
 def command(arguments: list[str]) -> int:
@@ -105,6 +106,7 @@ def _do(verb: str, options: dict[str, Any], report: Report) -> None:
         print(json.dumps(found.to_json()), flush=True)
         return
     work: Steps[object]
+    many = bool(frames or worlds or turns > 1) and verb != "plan"
     if verb == "plan":
         folder = planned["job"].resolve()
         work = plan(scene, layer, folder, frames, planned["tiles"], planned["seeds"])
@@ -117,8 +119,7 @@ def _do(verb: str, options: dict[str, Any], report: Report) -> None:
         work = relight_many(scene, layer, files, turns, frames or (), batch)
     else:
         work = {"capture": capture, "fit": fit, "relight": relight}[verb](scene, layer)
-    # of many, each piece is strict by itself
-    run(strictly(work) if batch.strict and not batch.keep_going else work, report)
+    run(_as_asked(work, batch, many), report)
     if verb == "capture" and named is None:
         print(
             "ARTO capture: the .blend was saved without the ID by which this capture is found when "
@@ -126,6 +127,14 @@ def _do(verb: str, options: dict[str, Any], report: Report) -> None:
             f"--command arto adopt --from '{paths.place(scene, layer).folder}'",
             flush=True,
         )
+
+
+def _as_asked(work: Steps[_Made], batch: Batch, many: bool) -> Steps[_Made]:
+    """The work, with warnings as errors where that is asked for.
+
+    many: whether it is a work of many pieces. With `--keep-going` these are strict each by itself.
+    """
+    return strictly(work) if batch.strict and not (many and batch.keep_going) else work
 
 
 def _scene(options: dict[str, Any]) -> tuple[bpy.types.Scene, str]:
@@ -219,7 +228,7 @@ def _of_a_farm(verb: str, options: dict[str, Any], report: Report, batch: Batch)
         work = gather(folder, batch)
     else:
         work = (save_part if options["save_blend"] else render_part)(folder, options["number"])
-    made = run(strictly(work) if batch.strict and not batch.keep_going else work, report)
+    made = run(_as_asked(work, batch, verb == "gather"), report)
     for path in made if isinstance(made, list) else [made]:
         # render managers look for this line
         print(f"Saved: '{path}'", flush=True)
