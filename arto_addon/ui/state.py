@@ -163,7 +163,8 @@ def _seconds(scene: bpy.types.Scene, paths_traced: int, unfinished: bool) -> tup
             head = there.head if there else None
             if head is None or not head.seconds or not head.traced:
                 continue
+            done = sum(tile.region.pixels for tile in head.tiles if tile.done)
+            share = 1 - done / sum(tile.region.pixels for tile in head.tiles) if unfinished else 1.0
             whole = head.seconds * paths_traced / head.traced
-            share = 1 - head.done / len(head.tiles) if unfinished else 1.0
             return OTHERS + whole * (share or 1.0), True
     return OTHERS + paths_traced * _GUESS / (os.cpu_count() or 1), False

@@ -155,8 +155,9 @@ def test_the_newest_wish_wins(on) -> None:
         assert viewer.made < 200
         # light is linear
         viewer.wish(Wish(image, 1.0, 0.0, 0.0, {}, resting=True))
-        while (one := viewer.take()) is None:
+        while (one := viewer.take()) is None and time.monotonic() < until:
             time.sleep(0.01)
+        assert one is not None
         np.testing.assert_allclose(last.picture[..., :3], 1000 * one.picture[..., :3], rtol=1e-3)
     finally:
         viewer.close()

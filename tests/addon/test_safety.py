@@ -46,8 +46,13 @@ signal.signal(signal.SIGINT, signal.SIG_IGN)  # as in the program, where a rende
 from pathlib import Path
 arto.register()
 from arto.arto_addon.job import run
-read = run.Task.read
-run.Task.read = lambda path: (time.sleep(0.5), read(path))[1]  # until it has looked at its input
+class Told(run._Told):  # the work begins when the job has looked at its input
+    def __init__(self, folder):
+        super().__init__(folder)
+        while not self.to_end:
+            time.sleep(0.01)
+
+run._Told = Told
 code = run.main(Path(sys.argv[1]))
 sys.stdout.flush()
 os._exit(code)  # Blender 4.5 as a module may crash where Python ends

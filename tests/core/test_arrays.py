@@ -48,12 +48,12 @@ def test_cuts_and_damaged_heads(tmp_path: Path, signed: bool) -> None:
     texts += [good.replace(heads[0], other.ljust(9))[: len(good)] for other in heads[1:]]
     texts += [good.replace(b"<f4", kind) for kind in (b"|O8", b"<M8", b"xxx")]
     tracemalloc.start()
-    begun = time.monotonic()
+    begun = time.process_time()
     for text in texts:
         path.write_bytes(text)
         with pytest.raises(ValueError):
             arrays.read(path, LARGE, signed)
-    assert time.monotonic() - begun < 5
+    assert time.process_time() - begun < 5
     assert tracemalloc.get_traced_memory()[1] < LARGE
     tracemalloc.stop()
 
