@@ -30,10 +30,10 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from .errors import ArtoError
+from .errors import ArtoError, FilesError
 from .file_names import is_plain_name
 from .region import Region
-from .regular import read_regular
+from .regular import WITHHELD, read_regular
 from .signed import parsed
 
 # The largest file that is read. Fingerprints of 100,000 objects take 8 MB.
@@ -59,6 +59,8 @@ class Description:
     ------
     ArtoError
         What `error` makes: the file cannot be read, is too large, or holds no JSON object.
+    FilesError
+        The file is withheld: by its permissions, its disk, or too many open files.
     """
 
     def __init__(
@@ -69,6 +71,10 @@ class Description:
             text = read_regular(path, most).decode("utf-8")
             self.data: dict[str, Any] = parsed(text)
         except (OSError, ValueError, RecursionError) as e:
+            if isinstance(e, OSError) and e.errno in WITHHELD:
+                raise FilesError(
+                    f"{path} cannot be read ({e}): see its permissions and disk"
+                ) from e
             raise error(f"{path} cannot be read ({e})") from e
 
     def wrong(self, name: str, value: Any) -> ArtoError:

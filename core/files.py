@@ -29,12 +29,9 @@ from types import TracebackType
 from . import marked
 from .errors import BusyError, FilesError
 from .marked import OLD
-from .regular import PART, SAFELY, new_file, unique
+from .regular import PART, SAFELY, moved, new_file, unique
 
 __all__ = ["OLD", "PART", "Lock", "moved", "replace_folder", "settle", "whole", "write_text"]
-
-# Seconds for which Windows may keep a file that somebody reads from being replaced.
-_PATIENCE = 3.0
 
 
 @contextlib.contextmanager
@@ -71,34 +68,6 @@ def whole(path: Path) -> Iterator[Path]:
         with contextlib.suppress(OSError):
             partial.unlink(missing_ok=True)
         raise
-
-
-def moved(source: Path, target: Path, patience: float = _PATIENCE) -> None:
-    """Give a file or folder another name; a file of that name is replaced.
-
-    Windows refuses while somebody reads the file, which is over in a moment: there the
-    function tries again.
-
-    Parameters
-    ----------
-    source, target : Path
-    patience : float
-        For how many seconds Windows is asked.
-
-    Raises
-    ------
-    OSError
-        The file cannot be renamed.
-    """
-    until = time.monotonic() + (patience if os.name == "nt" else 0)
-    while True:
-        try:
-            source.replace(target)
-            return
-        except PermissionError:
-            if time.monotonic() >= until:
-                raise
-        time.sleep(0.05)
 
 
 def write_text(path: Path, text: str) -> None:
@@ -143,7 +112,7 @@ def settle(folder: Path) -> None:
         if kind:
             marked.remove_quietly(old, kind, old.parent)
     else:
-        old.rename(folder)
+        moved(old, folder)
 
 
 def replace_folder(complete: Path, folder: Path) -> None:
@@ -171,10 +140,10 @@ def replace_folder(complete: Path, folder: Path) -> None:
             raise FilesError(f"{old} was not made by ARTO and is in the way: move it away")
         moved(folder, old)
     try:
-        complete.rename(folder)
+        moved(complete, folder)
     except OSError:
         if os.path.lexists(old):
-            old.rename(folder)
+            moved(old, folder)
         raise
     # what is left of it is found and removed by the next one
     settle(folder)
@@ -206,6 +175,8 @@ class Lock:
     def __init__(self, folder: Path, doing: str) -> None:
         self.path = folder / self.NAME
         self.doing = doing
+        # what a process was doing here that ended without letting go: cancelled, or killed
+        self.left = ""
         self._handle: int | None = None
 
     def __enter__(self) -> Lock:
@@ -226,6 +197,7 @@ class Lock:
                     f"{self.path.parent} is in use: {said or 'another process'}; wait until it is "
                     "done, or end it there"
                 ) from None
+            self.left = said
             try:
                 os.ftruncate(handle, 0)
                 _write(handle, f"{self.doing}, process {os.getpid()}")

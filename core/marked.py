@@ -36,7 +36,7 @@ from typing import Literal, get_args
 
 from . import before
 from .errors import FilesError
-from .regular import PART, cut, host, is_folder, json_object, new_file, unique
+from .regular import PART, cut, host, is_folder, json_object, moved, new_file, unique
 
 MARK = "arto-folder.json"
 OLD = ".old"
@@ -75,7 +75,7 @@ def mark(folder: Path, kind: Kind) -> None:
     new_file(partial)
     try:
         partial.write_text(text, encoding="utf-8")
-        partial.replace(folder / MARK)
+        moved(partial, folder / MARK)
     except BaseException:
         with contextlib.suppress(OSError):
             partial.unlink()

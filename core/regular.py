@@ -13,6 +13,7 @@ b''
 from __future__ import annotations
 
 import contextlib
+import errno
 import functools
 import hashlib
 import json
@@ -20,8 +21,11 @@ import os
 import platform
 import secrets
 import stat
+import time
 from pathlib import Path
 from typing import IO, Any
+
+from .errors import FilesError
 
 PART = ".part"
 
@@ -29,6 +33,11 @@ _NOFOLLOW = getattr(os, "O_NOFOLLOW", 0)
 _QUIETLY = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
 # How what may be written to is opened: no link, no waiting, and no other program has it.
 SAFELY = _NOFOLLOW | _QUIETLY
+# Errors that say nothing of what is in a file: who may read it, or the disk.
+WITHHELD = (errno.EACCES, errno.EPERM, errno.EIO, errno.ENOMEM, errno.ESTALE, errno.ETIMEDOUT)
+# Seconds for which Windows may keep a file that somebody reads from being replaced.
+_PATIENCE = 3.0
+_WINDOWS = os.name == "nt"
 _JUNCTION = 0xA0000003
 # A name that was cut short leaves room for what makes it unique: most disks take 255 bytes.
 _LONGEST = 180
@@ -52,10 +61,16 @@ def open_regular(path: Path, follow: bool = False) -> IO[bytes]:
     ------
     OSError
         The file is missing, or it is a link, a pipe, a device or a folder.
+    FilesError
+        This process has too many files open, which says nothing of the file.
     """
     if not follow and not _NOFOLLOW and path.is_symlink():
         raise OSError(f"{path} is a link")
-    handle = os.open(path, os.O_RDONLY | _QUIETLY | (0 if follow else _NOFOLLOW))
+    try:
+        handle = os.open(path, os.O_RDONLY | _QUIETLY | (0 if follow else _NOFOLLOW))
+    except OSError as e:
+        check_files_left(e)
+        raise
     try:
         if not stat.S_ISREG(os.fstat(handle).st_mode):
             raise OSError(f"{path} is no regular file")
@@ -63,6 +78,68 @@ def open_regular(path: Path, follow: bool = False) -> IO[bytes]:
     except BaseException:
         os.close(handle)
         raise
+
+
+def check_files_left(error: OSError) -> None:
+    """Tell a process that has too many files open from a file that cannot be read.
+
+    Parameters
+    ----------
+    error : OSError
+
+    Raises
+    ------
+    FilesError
+        The error is that there are too many.
+    """
+    if error.errno in (errno.EMFILE, errno.ENFILE):
+        raise FilesError(
+            f"too many files are open ({error.strerror}): close what uses many, or raise the limit "
+            "(ulimit -n), and start this again; nothing is damaged"
+        ) from error
+
+
+def created(path: Path) -> IO[bytes]:
+    """Make a file where there is none, and open it for writing.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    file
+        Opened in binary mode.
+
+    Raises
+    ------
+    OSError
+        The file cannot be made, or something has that name already, a link included.
+    """
+    return os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | SAFELY, 0o666), "wb")
+
+
+def last_of(path: Path, most: int) -> bytes:
+    """Read the end of a regular file.
+
+    Parameters
+    ----------
+    path : Path
+    most : int
+        How many bytes are read at most.
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    OSError
+        The file cannot be read, or is no regular file.
+    """
+    with open_regular(path) as file:
+        file.seek(max(file.seek(0, os.SEEK_END) - most, 0))
+        return file.read(most)
 
 
 def read_regular(path: Path, most: int, follow: bool = False) -> bytes:
@@ -105,7 +182,35 @@ def new_file(path: Path) -> None:
     OSError
         The file cannot be made, or something has that name already, a link included.
     """
-    os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | SAFELY, 0o666))
+    created(path).close()
+
+
+def moved(source: Path, target: Path, patience: float = _PATIENCE) -> None:
+    """Give a file or folder another name; a file of that name is replaced.
+
+    Windows refuses while somebody reads the file, which is over in a moment: there the
+    function tries again.
+
+    Parameters
+    ----------
+    source, target : Path
+    patience : float
+        For how many seconds Windows is asked.
+
+    Raises
+    ------
+    OSError
+        The file cannot be renamed.
+    """
+    until = time.monotonic() + (patience if _WINDOWS else 0)
+    while True:
+        try:
+            source.replace(target)
+            return
+        except PermissionError:
+            if time.monotonic() >= until:
+                raise
+        time.sleep(0.05)
 
 
 def unique(name: str, ending: str = PART) -> str:

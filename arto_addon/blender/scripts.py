@@ -10,6 +10,7 @@ import fnmatch
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 import bpy
 
@@ -37,6 +38,12 @@ def option() -> str:
     if not paths.use_scripts_auto_execute or _is_excluded(bpy.data.filepath):
         return REFUSED
     return ALLOWED
+
+
+def quietly() -> dict[str, Any]:
+    """How another Blender is started: on Windows without a console window that would flash, and
+    with a lower priority than the artist's work."""
+    return {"creationflags": 0x08000000 | 0x00004000} if sys.platform == "win32" else {}
 
 
 def check_drivers() -> None:

@@ -68,7 +68,13 @@ def capture(
     SceneError, CaptureSetError, FieldError, PatternError, BusyError (another process captures this
     shot), ExrError, CancelledError.
     """
-    with _claimed(scene, view_layer, together) as place:
+    with _claimed(scene, view_layer, together) as (place, left):
+        if left:
+            yield Progress(
+                0.0,
+                f"a process ended here in the middle of its work ({left}): if nobody stopped it, "
+                "memory is the likely cause; then lower Memory in ARTO's settings",
+            )
         return (yield from _capture(scene, view_layer, place, given, bool(together)))
 
 
@@ -77,7 +83,7 @@ def estimate(scene: bpy.types.Scene, view_layer: str) -> Steps[Estimate]:
 
     Raises what `capture` raises.
     """
-    with _claimed(scene, view_layer) as place, asked(scene, view_layer) as this:
+    with _claimed(scene, view_layer) as (place, _), asked(scene, view_layer) as this:
         plan, _ = yield from _begun(this, paths.unfinished_folder(place, this.key))
         return plan.estimate
 
@@ -85,15 +91,16 @@ def estimate(scene: bpy.types.Scene, view_layer: str) -> Steps[Estimate]:
 @contextmanager
 def _claimed(
     scene: bpy.types.Scene, view_layer: str, together: Sequence[int] = ()
-) -> Iterator[Path]:
-    """Check the scene, and hold the lock of its shot's own folder -> the folder."""
+) -> Iterator[tuple[Path, str]]:
+    """Check the scene, and hold the lock of its shot's own folder -> the folder, and what a process
+    was doing there that ended without letting go, or nothing."""
     check_scene(scene, view_layer)
     # let the scene follow what a script has moved
     scene.view_layers[view_layer].update()
     check_patterns(scene)
     claimed = paths.claim(scene, view_layer, together)
-    with Lock(claimed, f"capturing {shot_of(scene, view_layer).title}"):
-        yield claimed
+    with Lock(claimed, f"capturing {shot_of(scene, view_layer).title}") as held:
+        yield claimed, held.left
 
 
 def _capture(

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from ...core.errors import SceneError
+from ...core.memory import memory
 from ...core.region import Region
 from ...core.units import clock, size
 
@@ -33,37 +32,15 @@ FIELD, FIELD_PATCH = 74, 2.0
 SPARE = 0.05
 
 
-def memory() -> tuple[int, int | None]:
-    """The machine's memory and its free memory, in bytes; None where free memory is not known."""
-    if sys.platform == "win32":
-        import ctypes
-
-        class Status(ctypes.Structure):
-            _fields_ = (
-                ("length", ctypes.c_uint32), ("load", ctypes.c_uint32),
-                *((n, ctypes.c_uint64) for n in ("total", "free", "p", "q", "r", "s", "t")),
-            )  # fmt: skip
-
-        status = Status()
-        status.length = ctypes.sizeof(Status)
-        ctypes.windll.kernel32.GlobalMemoryStatusEx(ctypes.byref(status))
-        return int(status.total), int(status.free)
-    total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    try:
-        # memory that Linux can give without swapping; other systems have no such file
-        said = Path("/proc/meminfo").read_text(encoding="ascii")
-        return total, int(said.split("MemAvailable:")[1].split()[0]) << 10
-    except (OSError, IndexError, ValueError):
-        return total, None
-
-
 def budget(megabytes: int) -> int:
     """Memory that capture and fit may take, in bytes. megabytes: the artist's limit, 0 for none."""
     if megabytes:
         return megabytes << 20
     total, free = memory()
     share = int(total * SHARE) if free is None else int(min(total * SHARE, free * FREE_SHARE))
-    return max(LEAST_MEGABYTES << 20, share)
+    least = LEAST_MEGABYTES << 20
+    # with less than that free, tiles are as small as they must be
+    return max(least if free is None else min(least, int(free * FREE_SHARE)), share)
 
 
 def bytes_a_pixel(passes: int, patches: int, fitted: bool) -> int:
@@ -137,15 +114,29 @@ def estimate(
 
 def check_disk(folder: Path, needed: int, what: str) -> None:
     """Raise SceneError where a folder's disk has not the room."""
-    there = folder
-    while not there.exists():
-        there = there.parent
-    free = shutil.disk_usage(there).free
+    free = free_disk(folder)
     if free < needed * (1 + SPARE):
         raise SceneError(
             f"{what} needs {size(needed)} of disk, and {folder} has {size(free)} free: make room, "
             "choose another folder in ARTO's settings, or let Keep Basis Images be Never"
         )
+
+
+def free_disk(folder: Path) -> int:
+    """How many bytes are free on the disk of a folder, which may not be there yet.
+
+    Raises SceneError where the disk itself is missing: a drive that is not connected.
+    """
+    for there in (folder, *folder.parents):
+        try:
+            return shutil.disk_usage(there).free
+        except (FileNotFoundError, NotADirectoryError):
+            continue
+        except OSError as e:
+            raise SceneError(f"{there} cannot be asked for its room ({e}): choose another") from e
+    raise SceneError(
+        f"the disk of {folder} is not there: connect it, or choose another folder in the settings"
+    )
 
 
 def check_memory(needed: int, what: str) -> None:

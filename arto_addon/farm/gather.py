@@ -18,7 +18,7 @@ from ...core.capture.tile_entry import SeedEntry, fitted_name, sums_of
 from ...core.errors import ArtoError, FarmError
 from ...core.field.field import proxy_folder
 from ...core.field.proxy import FACTORS
-from ...core.files import PART, Lock
+from ...core.files import PART, Lock, moved
 from ...core.fit.fit import fit_into
 from ..capture import room
 from ..capture.capture import check_file, plan_of
@@ -215,7 +215,7 @@ def _taken(
         for i, name in enumerate(told.files):
             names.append(f"tile_{part.tile:04d}_seed_{part.seed:02d}_{i:04d}.exr")
             if (told.folder / name).exists():  # otherwise an earlier gathering moved it
-                (told.folder / name).replace(folder / names[-1])
+                moved(told.folder / name, folder / names[-1])
             if name in told.sums:
                 sums[names[-1]] = told.sums[name]
         seeds.append(SeedEntry(told.samples, tuple(names)))
@@ -244,7 +244,7 @@ def _take_field(source: Path, field: Path, name: str) -> None:
             marked.mark(there, "field")
             if (there / name).is_dir():
                 marked.remove(there / name, "tile", there)
-            (here / name).replace(there / name)
+            moved(here / name, there / name)
 
 
 def _fit(captured: CaptureSet, tile: int, tiles: int) -> Steps[dict]:

@@ -80,6 +80,8 @@ class JobHead:
     scene, view_layer : their names in the file.
     settings : ARTO's settings, by name.
     frames : the numbers of the frames.
+    library : the file name of the library that the scene is from, empty for one of the file itself.
+    scripts : whether Python in the file was allowed where the job was planned.
     subframe : the same for all frames.
     catchers : the frames that show shadow catchers.
     tiles : how many for each frame.
@@ -97,6 +99,8 @@ class JobHead:
     subframe: float = 0.0
     catchers: tuple[int, ...] = ()
     blender: str = ""
+    library: str = ""
+    scripts: bool = False
     others: Mapping[str, object] = field(default_factory=dict)
 
     @staticmethod
@@ -127,6 +131,8 @@ class JobHead:
             subframe=0.0 if subframe is None else subframe,
             catchers=catchers,
             blender=said.some_text("blender") or "",
+            library=said.some_text("library") or "",
+            scripts=said.kind("scripts", bool, False),
             others=said.others([*_WRITTEN, *(f.name for f in fields(JobHead))]),
         )
         if head.parts > MOST:
@@ -143,6 +149,8 @@ class JobHead:
             "blend": self.blend,
             "blender": self.blender,
             "scene": self.scene,
+            "library": self.library,
+            "scripts": self.scripts,
             "view_layer": self.view_layer,
             "settings": dict(self.settings),
             "frames": list(self.frames),

@@ -17,6 +17,7 @@ from ...core.capture.capture_set import CaptureSet
 from ...core.capture.head import CaptureHead
 from ...core.capture.kinds import Quality, Take
 from ...core.errors import FarmError
+from ..blender import scripts
 from ..capture import room
 from ..capture.capture import plan_of
 from ..capture.room import Estimate
@@ -82,10 +83,15 @@ class Job:
         return int(head.samples) // (self.head.seeds if head.done else 1)
 
     def go_to(self, scene: bpy.types.Scene, frame: int) -> None:
-        """Bring the scene to a frame, at the subframe that was planned."""
+        """Bring the scene to a frame, at the subframe that was planned.
+
+        Raises SceneError where a driver by Python is refused here that ran where it was planned.
+        """
         scene.frame_set(frame, subframe=self.head.subframe)
         # let the scene follow what a script has moved
         scene.view_layers[self.head.view_layer].update()
+        if self.head.scripts:
+            scripts.check_drivers()
 
     def part_folder(self, part: Part) -> Path:
         return self.folder / "parts" / part.name
@@ -111,7 +117,7 @@ class Job:
         At the end the scene has its own settings and its frame again. Raises FarmError where the
         job was planned from another file.
         """
-        scene = bpy.data.scenes.get(self.head.scene)
+        scene = _scene(self.head.scene, self.head.library)
         layer = self.head.view_layer
         if scene is None or layer not in scene.view_layers:
             raise FarmError(
@@ -127,6 +133,16 @@ class Job:
                 _set(scene, before)
 
 
+def _scene(name: str, library: str) -> bpy.types.Scene | None:
+    """The scene of a name that is from a library of a file name, or from the file itself."""
+    found = [
+        scene
+        for scene in bpy.data.scenes
+        if scene.name == name and Path(home.library_of(scene)).name == library
+    ]
+    return found[0] if len(found) == 1 else None
+
+
 def set_folder(folder: Path, frame: int, take: Take) -> Path:
     """The folder of the capture set of a take of a frame, in a job's folder."""
     return folder / (f"frame_{frame:04d}" + (f"_{take}" if take else ""))
@@ -139,7 +155,12 @@ def _set(scene: bpy.types.Scene, settings: Mapping[str, object]) -> None:
     for name in FARM:
         if name in settings:
             value = settings[name]
-            setattr(scene.arto, name, set(value) if isinstance(value, list) else value)
+            try:
+                setattr(scene.arto, name, set(value) if isinstance(value, list) else value)
+            except (TypeError, ValueError, OverflowError) as e:
+                raise FarmError(
+                    f"the job's setting '{name}' cannot be {value!r:.60} ({e}): plan again"
+                ) from e
 
 
 def estimate(head: CaptureHead, fitted: bool) -> Estimate:
@@ -180,6 +201,8 @@ def write(
         blend=blend.name,
         blender=bpy.app.version_string,
         scene=scene.name,
+        library=Path(home.library_of(scene)).name,
+        scripts=not bpy.app.autoexec_fail,
         view_layer=view_layer,
         settings=settings_of(scene),
         frames=tuple(frames),

@@ -72,7 +72,12 @@ def render_part(job_folder: Path, number: int) -> Steps[Path]:
             sums=sums_of(partial, files),
         )
         write_part(partial, told)
-        replace_folder(partial, folder)
+        try:
+            replace_folder(partial, folder)
+        except OSError:
+            # a farm may give a part to two machines: then the other one was first
+            if not job.there(part, captured.head.key):
+                raise
     except OSError as e:
         raise FarmError(f"{folder} cannot be written ({e}): make room, or see who may write") from e
     finally:

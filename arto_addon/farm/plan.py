@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-import shutil
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -205,7 +204,7 @@ def _disk(head: CaptureHead, seeds: int) -> int:
 
 def _check_disk(folder: Path, needed: int) -> None:
     """Raise FarmError where the disk of a job's folder has no room for the parts."""
-    free = shutil.disk_usage(folder).free
+    free = room.free_disk(folder)
     if free < needed * (1 + room.SPARE):
         raise FarmError(
             f"the parts of this job need {size(needed)} of disk, and {folder} has "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shlex
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from ...core.description import MOST_BYTES
 from ...core.errors import FarmError
 from ...core.files import write_text
 from ...core.regular import read_regular
+from ..blender import scripts
 from ..blender.addon import ADDON
 from .job import Job
 
@@ -18,7 +20,7 @@ OPENJD = "openjd.json"
 LINES = "commands.txt"
 FLAMENCO = "arto_capture.js"
 # Factory settings and this add-on alone: workers have no user preferences.
-QUIET = ["-b", "--factory-startup", "--offline-mode", "--addons"]
+QUIET = ["-b", "--factory-startup", "--offline-mode"]
 
 
 def write(job: Job) -> None:
@@ -26,6 +28,8 @@ def write(job: Job) -> None:
     write_text(job.folder / OPENJD, json.dumps(openjd(job), indent=1))
     write_text(job.folder / LINES, "\n".join(lines(job)) + "\n")
     script = Path(__file__).with_name(FLAMENCO).read_text(encoding="utf-8")
+    if scripts.ALLOWED in _quietly():
+        script = script.replace('"--addons"', f'"{scripts.ALLOWED}", "--addons"')
     write_text(job.folder / FLAMENCO, script)
 
 
@@ -47,14 +51,14 @@ def openjd(job: Job) -> dict[str, object]:
     """A job template by the Open Job Description of 2023-09: render parts, then gather."""
 
     def run(*verb: str) -> dict[str, object]:
-        start = [*QUIET, "{{Param.Addon}}", "{{Param.Blend}}", "--command", "arto"]
+        start = [*_quietly(), "{{Param.Addon}}", "{{Param.Blend}}", "--command", "arto"]
         arguments = [*start, *verb, "--job", "{{Param.Job}}", "--openjd"]
         action = {"command": "{{Param.Blender}}", "args": arguments}
         return {"script": {"actions": {"onRun": action}}}
 
     return {
         "specificationVersion": "jobtemplate-2023-09",
-        "name": f"ARTO {Path(job.head.blend).stem}"[:64],
+        "name": job_name(job.head.blend),
         "parameterDefinitions": [
             {"name": "Blender", "type": "STRING", "default": "blender"},
             {"name": "Addon", "type": "STRING", "default": ADDON},
@@ -76,13 +80,25 @@ def openjd(job: Job) -> dict[str, object]:
     }
 
 
+def _quietly() -> list[str]:
+    """Blender's options on a farm. Python in the file runs where it runs in this session."""
+    allowed = [scripts.ALLOWED] if scripts.option() == scripts.ALLOWED else []
+    return [*QUIET, *allowed, "--addons"]
+
+
+def job_name(blend: str) -> str:
+    """The name of a job of a .blend: OpenJD takes it for a format string of one line."""
+    name = re.sub(r"[{}]|[^\x20-\x7e\xa0-\U0010ffff]", "_", Path(blend).stem)
+    return f"ARTO {name}"[:64].strip()
+
+
 def lines(job: Job) -> list[str]:
     """A shell line for each part, and a last line that gathers the parts.
 
     `$BLEND` is the file and `$JOB` the job's folder. The lines may run on any machine in any order,
     except the last, which must run after all others.
     """
-    start = ["blender", *QUIET, ADDON]
+    start = ["blender", *_quietly(), ADDON]
     head = f'{shlex.join(start)} "$BLEND" --command arto'
     return [
         *(f'{head} part {part.number} --job "$JOB"' for part in job.parts),

@@ -18,7 +18,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
-import numpy as np
 
 from ...core import marked
 from ...core.errors import ArtoError, CancelledError, SceneError
@@ -26,6 +25,7 @@ from ..blender import devices, scripts
 from ..blender.compositing import places_of_groups
 from ..shot import home
 from ..work import STOPPED, Progress, Render, Steps, run
+from .snapshot import put_pixels
 from .task import State, Task
 from .verbs import VERBS
 
@@ -71,7 +71,7 @@ def main(path: Path) -> int:
 
 def _steps(task: Task, folder: Path) -> Steps[Path | None]:
     home.set_file(task.blend)
-    scene = bpy.data.scenes.get(task.scene)
+    scene = home.of_library(bpy.data.scenes, task.scene, task.library)
     if scene is None:
         raise SceneError(f"there is no scene '{task.scene}'")
     if task.scripts and task.view_layer in scene.view_layers:
@@ -80,13 +80,10 @@ def _steps(task: Task, folder: Path) -> Steps[Path | None]:
     devices.use(task.devices)
     _turn_paths(folder)
     for painted in task.painted:
-        image = bpy.data.images.get(
-            (painted.name, painted.library) if painted.library else painted.name
-        )
+        image = home.of_library(bpy.data.images, painted.name, painted.library)
         if image is None:
             raise SceneError(f"the painted image '{painted.name}' is not in the copy of the file")
-        image.pixels.foreach_set(np.load(folder / painted.pixels))
-        image.update()
+        put_pixels(image, folder / painted.pixels)
     return VERBS[task.verb].steps(scene, task.view_layer)
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import re
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -23,6 +22,8 @@ from bpy.app.handlers import persistent
 from ...core import marked
 from ...core.errors import ArtoError, BusyError, SceneError
 from ...core.files import Lock
+from ...core.memory import ended_by
+from ...core.regular import created, last_of
 from ...core.units import clock
 from ..blender import scripts
 from ..blender.addon import ADDON
@@ -37,6 +38,8 @@ from .verbs import VERBS, Verb
 # Seconds between the window's looks at a job's progress.
 EVERY = 0.2
 LOG = "log.txt"
+# Bytes of the log's end that are looked at.
+_LONGEST = 1 << 16
 
 
 @dataclass
@@ -73,13 +76,13 @@ class SecondBlender:
         self.lock = Lock(self.folder, "following").__enter__()
         try:
             blend, task = snapshot.take(self.folder, verb, scene, view_layer)
-            self.log = (self.folder / LOG).open("wb")
+            self.log = created(self.folder / LOG)
             self.process = subprocess.Popen(
                 _command(blend, task),
                 stdin=subprocess.PIPE,
                 stdout=self.log,
                 stderr=subprocess.STDOUT,
-                **_QUIETLY,
+                **scripts.quietly(),
             )
         except OSError as e:
             self.remove()
@@ -106,7 +109,7 @@ class SecondBlender:
         if not found.end and self.told:
             found = State(found.share, "cancelled: finished tiles are kept", end="cancelled")
         elif not found.end:
-            text = f"its Blender ended too early (exit code {self.process.returncode})"
+            text = f"its Blender ended too early ({ended_by(self.process.returncode)})"
             lines = self._last_lines()
             found = State(
                 found.share,
@@ -118,7 +121,7 @@ class SecondBlender:
 
     def _last_lines(self) -> str:
         with contextlib.suppress(OSError):
-            text = (self.folder / LOG).read_text(encoding="utf-8", errors="replace")
+            text = last_of(self.folder / LOG, _LONGEST).decode("utf-8", "replace")
             # the last lines are for the console; the panel shows the first line
             return "\n" + "\n".join(text.strip().splitlines()[-8:])
         return ""
@@ -160,12 +163,6 @@ class SecondBlender:
         left = self.state.left
         spent = clock(self.spent)
         return f"{self.state.share:.0%}, " + (f"{clock(left)} left" if left is not None else spent)
-
-
-# On Windows: no console window, and a lower priority than the artist's work.
-_QUIETLY: dict = (
-    {"creationflags": 0x08000000 | 0x00004000} if sys.platform == "win32" else {}  # type: ignore
-)
 
 
 def _command(blend: Path, task: Path) -> list[str]:

@@ -8,14 +8,17 @@ beside the snapshot.
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from pathlib import Path
 
 import bpy
 import numpy as np
 
+from ...core import arrays, marked
 from ...core.errors import SceneError
 from ..blender import devices
+from ..shot import home
 from .task import Painted, Task
 from .verbs import Verb
 
@@ -44,7 +47,16 @@ def take(folder: Path, verb: Verb, scene: bpy.types.Scene, view_layer: str) -> t
         _link_caches(folder)
         ran = not bpy.app.autoexec_fail
         blend_of = bpy.data.filepath
-        task = Task(verb, scene.name, view_layer, blend_of, devices.chosen(), painted, ran)
+        task = Task(
+            verb,
+            scene.name,
+            view_layer,
+            blend_of,
+            devices.chosen(),
+            painted,
+            ran,
+            home.library_of(scene),
+        )
         return blend, task.write(folder)
     except (OSError, RuntimeError) as e:
         raise SceneError(
@@ -73,13 +85,24 @@ def painted_pixels(image: bpy.types.Image, folder: Path) -> str:
     pixels = np.empty(len(image.pixels), np.float32)
     image.pixels.foreach_get(pixels)
     name = f"painted_{image.session_uid}.npy"
-    np.save(folder / name, pixels)
+    arrays.write(folder / name, pixels)
     return name
 
 
+def put_pixels(image: bpy.types.Image, path: Path) -> None:
+    """Give an image the pixels that `painted_pixels` wrote. Raises SceneError."""
+    try:
+        pixels = arrays.read(path, 4 * len(image.pixels))
+        if pixels.shape != (len(image.pixels),) or pixels.dtype != np.float32:
+            raise ValueError(f"it has not the pixels of '{image.name}'")
+    except (OSError, ValueError) as e:
+        raise SceneError(f"{path} cannot be read ({e}): start the work again") from e
+    image.pixels.foreach_set(pixels)
+    image.update()
+
+
 def _painted(image: bpy.types.Image, folder: Path) -> Painted:
-    library = image.library.filepath if image.library else ""
-    return Painted(image.name, library, painted_pixels(image, folder))
+    return Painted(image.name, home.library_of(image), painted_pixels(image, folder))
 
 
 def _link_caches(folder: Path) -> None:
@@ -90,9 +113,24 @@ def _link_caches(folder: Path) -> None:
     caches = blend.with_name(f"blendcache_{blend.stem}")
     if not caches.is_dir():
         return
-    if sys.platform == "win32":
-        import _winapi
+    link_folder(caches, folder / caches.name)
 
-        _winapi.CreateJunction(str(caches), str(folder / caches.name))
-    else:
-        (folder / caches.name).symlink_to(caches, target_is_directory=True)
+
+def link_folder(source: Path, link: Path) -> None:
+    """Make a link to a folder. Raises SceneError where the system cannot."""
+    try:
+        if sys.platform == "win32":
+            import _winapi
+
+            # no right is needed for a junction, but it leads to disks of this machine alone
+            with contextlib.suppress(OSError):
+                _winapi.CreateJunction(str(source), str(link))
+                return
+            with contextlib.suppress(OSError):
+                marked.remove_empty(link)  # what a junction that failed has left
+        link.symlink_to(source, target_is_directory=True)
+    except (OSError, NotImplementedError) as e:
+        raise SceneError(
+            f"the simulation caches in {source} cannot be linked to ({e}): Windows does so for "
+            "folders on its own disks alone; copy the .blend and its caches to one of these"
+        ) from e

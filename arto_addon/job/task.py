@@ -43,7 +43,8 @@ class Task:
 
     blend: the artist's file, empty where it was never saved; devices: the artist's render devices,
     None where Cycles is switched off; painted: images whose pixels are in no file; scripts: whether
-    the window has allowed all scripts of the file.
+    the window has allowed all scripts of the file; library: the path of the library that the scene
+    is from, empty for a scene of the file itself.
     """
 
     verb: Verb
@@ -53,6 +54,7 @@ class Task:
     devices: Devices | None = None
     painted: tuple[Painted, ...] = ()
     scripts: bool = False
+    library: str = ""
 
     def write(self, folder: Path) -> Path:
         path = folder / TASK
@@ -63,7 +65,9 @@ class Task:
     def read(path: Path) -> Task:
         """Read a task. Raises ArtoError where the file is no task."""
         said = Description(path, _no_task)
-        said.only("verb", "scene", "view_layer", "blend", "devices", "painted", "scripts")
+        said.only(
+            "verb", "scene", "view_layer", "blend", "devices", "painted", "scripts", "library"
+        )
         return Task(
             said.choice("verb", VERBS),
             said.text("scene"),
@@ -72,6 +76,7 @@ class Task:
             _devices(said),
             tuple(_painted(said, entry) for entry in said.kind("painted", list, [])),
             said.kind("scripts", bool, False),
+            said.kind("library", str, ""),
         )
 
 

@@ -21,13 +21,14 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core import marked
+from ...core import arrays, marked
 from ...core.errors import ArtoError, SceneError
+from ...core.memory import ended_by
 from ..blender import scripts
 from ..blender.addon import ADDON
 from ..blender.colour import work_in, working_space
 from ..blender.nodes import shader_tree, trees
-from ..job.snapshot import in_no_file, painted_pixels
+from ..job.snapshot import in_no_file, painted_pixels, put_pixels
 from ..shot import home, walk
 from ..world import kept
 from ..world.bake import rough
@@ -41,6 +42,8 @@ ANSWER = "ARTO map "
 # Width of a rough map, which takes a moment to make, and the number of maps kept in memory.
 ROUGH_WIDTH = 512
 MOST = 8
+# The file of a map on its way, and the most bytes that it may have: 16384 x 8192 texels.
+MAP, MOST_BYTES = "map.npy", 16384 * 8192 * 3 * 4
 # Seconds that the second Blender has to end by itself.
 _REAP = 2.0
 
@@ -99,6 +102,7 @@ class Maps:
                 text=True,
                 encoding="utf-8",
                 errors="replace",
+                **scripts.quietly(),
             )
         except OSError as e:
             raise SceneError(f"a second Blender cannot be started ({e})") from e
@@ -156,7 +160,7 @@ class Maps:
             textures=of_textures(scene),
             painted=painted,
             folder=str(home.absolute(scene.arto.folder)),
-            out=str(self._folder / "map.npy"),
+            out=str(self._folder / MAP),
         )
         self._asked = (key, full)
         try:
@@ -173,14 +177,19 @@ class Maps:
             if line.startswith(ANSWER):
                 try:
                     said = json.loads(line[len(ANSWER) :])
-                    found = None if "error" in said else np.load(said["map"])
+                    found = None if "error" in said else _map(self._folder / MAP)
                     self._answered(found, said.get("error", ""))
-                except (OSError, ValueError, EOFError, KeyError) as e:
+                except (OSError, ValueError, AttributeError, TypeError) as e:
                     self._answered(None, f"the map of the world cannot be read ({e})")
         # If a world makes the process end, the world counts as failed and is not tried again. If
         # another process has been started since, the open question is for the new process.
         if process is self._process:
-            self._answered(None, "the Blender that makes maps of the world ended: change the world")
+            try:
+                how = ended_by(process.wait(_REAP))
+            except subprocess.TimeoutExpired:
+                how = "it closed its output"
+            text = f"the Blender that makes maps of the world ended ({how}): change the world"
+            self._answered(None, text)
 
     def _answered(self, found: NDArray[np.float32] | None, error: str) -> None:
         """Close the open question: keep its map, or why there is none."""
@@ -208,6 +217,16 @@ class Maps:
             except subprocess.TimeoutExpired:
                 self._process.kill()
         marked.remove_quietly(self._folder, "maps", self._folder.parent)
+
+
+def _map(path: Path) -> NDArray[np.float32]:
+    """A map (W / 2, W, 3) that the second Blender made. Raises OSError, ValueError."""
+    found = arrays.read(path, MOST_BYTES)
+    if found.dtype != np.float32 or found.ndim != 3 or found.shape[1:] != (2 * len(found), 3):
+        raise ValueError(f"it is no map, but {found.dtype} of {found.shape}")
+    if not np.isfinite(found).all():
+        raise ValueError("it is infinite or not a number in some texels")
+    return found
 
 
 def _write(scene: bpy.types.Scene, layer: str, world: bpy.types.World, blend: Path) -> str:
@@ -265,8 +284,7 @@ def _made(asked: Question) -> str:
     try:
         for name, pixels in asked.painted.items():
             image = bpy.data.images[name]
-            image.pixels.foreach_set(np.load(pixels))
-            image.update()
+            put_pixels(image, Path(pixels))
         if not asked.width:
             for image in images(world):
                 if reduced := _reduced(image):
@@ -276,7 +294,7 @@ def _made(asked: Question) -> str:
                 found = kept.environment(scene, asked.width, None, plain)
             else:
                 found = rough(scene, ROUGH_WIDTH, plain)
-        np.save(asked.out, found.image)
+        arrays.write(Path(asked.out), found.image)
     finally:
         bpy.data.worlds.remove(world)
         marked.remove_file(Path(asked.blend), "maps")

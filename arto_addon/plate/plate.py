@@ -18,6 +18,7 @@ from ...core.field.field import Field
 from ...core.files import whole
 from ..blender.colour import working_space
 from ..blender.compositing import mixed
+from ..shot import home
 from .header import header
 from .names import relit_name
 
@@ -178,7 +179,7 @@ def name_of(scene: bpy.types.Scene, look: str | None = None) -> str:
 def show(path: Path, name: str = IMAGE) -> bpy.types.Image:
     """Load a plate's file anew as Blender's image of a name, and return the image."""
     image = bpy.data.images.get(name)
-    relative = bpy.path.relpath(str(path)) if bpy.data.filepath else str(path)
+    relative = home.relative(path)
     if image is None:
         image = bpy.data.images.load(str(path))
         image.name = name

@@ -17,6 +17,7 @@ from ...core.errors import SceneError
 from ...core.field import head as field_heads
 from ...core.field.head import HEADER as FIELD_HEADER
 from ...core.field.writer import write_head
+from ...core.files import moved
 from ...core.shot import Shot
 from ..stage.takes import TAKES
 from . import paths, scene_id
@@ -45,7 +46,7 @@ def adopt(scene: bpy.types.Scene, view_layer: str, source: Path) -> Path:
                 partial = marked.scratch(folder / name, _KINDS[name])
                 _share(source / name, partial)
                 _give(partial, own)
-                partial.rename(folder / name)
+                moved(partial, folder / name)
                 partial = None
             except OSError as e:
                 raise SceneError(f"{source / name} cannot be taken over ({e}): make room") from e

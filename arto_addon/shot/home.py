@@ -6,7 +6,9 @@ the folder of the original .blend.
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
+from typing import Any
 
 import bpy
 
@@ -42,3 +44,28 @@ def absolute(path: str, library: bpy.types.Library | None = None) -> Path:
             "ARTO's folder and output to absolute paths"
         )
     return Path(bpy.path.abspath(path, start=str(Path(file()).parent)))
+
+
+def relative(path: Path) -> str:
+    """A path as the open file has it: from its folder with `//`, where it lies on the same disk."""
+    if bpy.data.filepath:
+        # Windows has no way from one drive to another
+        with contextlib.suppress(ValueError):
+            return bpy.path.relpath(str(path))
+    return str(path)
+
+
+def library_of(block: bpy.types.ID) -> str:
+    """The absolute path of the library that a data-block is from; empty for one of the file."""
+    library = block.library
+    if library is None:
+        return ""
+    return str(Path(bpy.path.abspath(library.filepath, library=library.parent)).resolve())
+
+
+def of_library(blocks: Any, name: str, library: str) -> Any:
+    """The data-block of a name that is from a library, or from the file itself (empty), or None.
+
+    A library may have one of the same name as the file has.
+    """
+    return next((b for b in blocks if b.name == name and library_of(b) == library), None)

@@ -242,7 +242,7 @@ def shown(scene: bpy.types.Scene) -> str:
     """The shot's folder as a panel shows it; empty where there is none."""
     try:
         folder = place(scene, fresh=bpy.app.background).folder
-        return bpy.path.relpath(str(folder)) if bpy.data.filepath else str(folder)
+        return home.relative(folder)
     except (ArtoError, OSError, ValueError):  # ValueError: the folder is on another drive.
         return ""
 

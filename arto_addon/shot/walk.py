@@ -16,6 +16,8 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ...core.regular import open_regular
+
 _DEPTH = 12
 
 
@@ -318,7 +320,8 @@ def file(path: str, library: bpy.types.Library | None, then: str = "", full: boo
         # ctime and inode.
         key = str(there), size, at, stat.st_ctime_ns, stat.st_ino
         if key not in _contents:
-            with there.open("rb") as f:
+            # a pipe or a device would be waited for, or read for ever
+            with open_regular(there, follow=True) as f:
                 _contents[key] = hashlib.file_digest(
                     f, lambda: hashlib.blake2b(digest_size=12)
                 ).hexdigest()

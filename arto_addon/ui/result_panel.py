@@ -13,7 +13,7 @@ from ..job import session
 from ..plate.names import relit_file
 from ..plate.verify import verify_file
 from ..relight.light_key import HEADER, light_key
-from ..shot import paths, status
+from ..shot import home, paths, status
 from ..shot.shot import layer_of
 from ..world.check import world_of
 from . import shot_panel, thumbnails
@@ -120,17 +120,7 @@ class Result(Draws):
         column.prop(settings, "use_in_compositor", text="")
         column.operator("arto.save_composite", icon="FILE_TICK")
         if path:
-            say(column, context, _short(path), "FILE_IMAGE")
-
-
-def _short(path: Path) -> str:
-    """A path as Blender shows it: relative to the .blend, where both are on one drive."""
-    if bpy.data.filepath:
-        try:
-            return bpy.path.relpath(str(path))
-        except ValueError:  # another drive
-            pass
-    return str(path)
+            say(column, context, home.relative(path), "FILE_IMAGE")
 
 
 def _seen(column: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 import bpy
 
-from ...core.errors import SceneError
+from ...core import exr
+from ...core.errors import ArtoError, SceneError
 from ..blender.nodes import shader_tree
 from ..blender.reached import gives, reached
 from ..shot.shot import layer_of
@@ -73,10 +75,17 @@ def check_images(world: bpy.types.World, frame: int) -> None:
             for path in files_at(node, frame):
                 _check_readable(path)
         elif node.image.source in {"FILE", "MOVIE", "TILED"} and min(node.image.size) == 0:
-            raise _unreadable(node.image.name)
+            path = bpy.path.abspath(node.image.filepath, library=node.image.library)
+            raise _unreadable(node.image.name, Path(path))
 
 
-def _unreadable(name: str) -> SceneError:
+def _unreadable(name: str, path: Path) -> SceneError:
+    with contextlib.suppress(ArtoError):
+        if path.suffix.lower() == ".exr" and (layers := exr.part_names(path)):
+            return SceneError(
+                f"the world's image '{name}' is an EXR of layers ({', '.join(layers[:3])}), which "
+                "Blender does not show as one picture: write the layer alone, as R, G, B"
+            )
     return SceneError(
         f"the world's image '{name}' cannot be read, it is damaged or cut off: copy the file "
         "anew, or choose another"
@@ -88,10 +97,10 @@ def _check_readable(path: Path) -> None:
     try:
         alone = bpy.data.images.load(str(path))
     except RuntimeError as e:
-        raise _unreadable(path.name) from e
+        raise _unreadable(path.name, path) from e
     try:
         if min(alone.size) == 0:
-            raise _unreadable(path.name)
+            raise _unreadable(path.name, path)
     finally:
         bpy.data.images.remove(alone)
 

@@ -19,6 +19,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from ..errors import ExrError
+from ..regular import check_files_left
 from .layout import LayoutError, PlainPart
 from .layout import check as check_layout
 from .layout import plain as plain_parts
@@ -145,6 +146,7 @@ def _opened(path: Path) -> mmap.mmap:
         with path.open("rb") as f:
             return mmap.mmap(f.fileno(), 0, access=mmap.ACCESS_READ)
     except OSError as e:
+        check_files_left(e)
         raise ExrError(f"{path} cannot be read ({e}): look at its permissions and disk") from e
 
 

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from .. import checksum
 from ..errors import FieldError
 from ..files import whole
-from ..regular import open_regular
+from ..regular import WITHHELD, open_regular
 
 MAGIC = b"ARTOTILE"
 VERSION = 1
@@ -299,6 +299,8 @@ def _opened(path: Path) -> Iterator[IO[bytes]]:
         # a pipe or a device in its place would be waited for
         file = open_regular(path, follow=True)
     except OSError as e:
+        if e.errno in WITHHELD:
+            raise FieldError(f"{path} cannot be read ({e}): see its permissions and disk") from e
         raise _damaged(path, e) from e
     with file:
         yield file

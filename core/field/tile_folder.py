@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ..arrays import LONGEST_HEAD, head
 from ..errors import FieldError
 from ..files import whole
-from ..regular import open_regular
+from ..regular import WITHHELD, check_files_left, open_regular
 
 
 class TileFolder:
@@ -71,6 +71,12 @@ class TileFolder:
                 return np.zeros(shape, dtype)  # nothing to map
             return np.memmap(path, dtype, "r", first, shape)
         except (OSError, ValueError) as e:
+            if isinstance(e, OSError):
+                check_files_left(e)
+                if e.errno in WITHHELD:
+                    raise FieldError(
+                        f"{path} cannot be read ({e}): see its permissions and disk"
+                    ) from e
             raise FieldError(f"{path} is missing or damaged ({e}): fit again") from e
 
 

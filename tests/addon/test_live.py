@@ -234,10 +234,10 @@ def test_half_a_map_is_said(scene, monkeypatch) -> None:
     try:
         assert _answer(made, scene, "one") == ""
 
-        def half(path):
-            raise EOFError("no data left in file")
+        def half(path, most):
+            raise ValueError(f"{path} is not what was written")
 
-        monkeypatch.setattr(maps.np, "load", half)
+        monkeypatch.setattr(maps.arrays, "read", half)
         assert "cannot be read" in _answer(made, scene, "two")
         monkeypatch.undo()
         assert _answer(made, scene, "three") == ""
