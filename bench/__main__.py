@@ -265,7 +265,7 @@ def main() -> int:
     c.set_defaults(run=_stability)
 
     c = commands.add_parser("safety", help="damages and files of others: what comes of each")
-    c.add_argument("--json", type=Path, default=Path("out/stability.json"))
+    c.add_argument("--json", type=Path, default=Path("out/safety.json"))
     c.set_defaults(run=_safety)
 
     c = commands.add_parser("models", help="every support model on the same captures")

@@ -1,121 +1,96 @@
-"""Damages and files of others, in temporary folders: what comes of each.
+"""Damages, kills and files of others, in temporary folders: what comes of each.
 
 An outcome is `right`, `typed error`, `wrong` (another value without a word), `lost` (a file of
-others is gone or changed), `hang` (over a second) or `traceback`.
+others is gone or changed), `hang` (waits, or takes a second of a processor or
+200 MB more than undamaged) or `traceback`.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
-import random
+import signal
 import tempfile
 import time
-from collections.abc import Callable
+import tracemalloc
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from arto.core import arrays, marked
-from arto.core.capture import capture_set
-from arto.core.capture.head import HEADER
 from arto.core.errors import ArtoError
-from arto.core.files import Lock, replace_folder
-from arto.core.hemicube import Hemicube
-from arto.core.patterns import pattern_set
 
-SECONDS = 1.0
-DAMAGES = 150
+from . import safety_damages, safety_kills, safety_others
+
+SECONDS, BYTES = 1.0, 200 << 20
+# A piece of work, and whether its result is right.
+Work = Callable[[], bool]
+# A case: what it is, and the work with it.
+Cases = Iterator[tuple[str, Work]]
+# What work may raise: reading an array says what is wrong with it in errors of Python's own, which
+# its callers turn into typed ones.
+TYPED = (ArtoError, safety_damages.DamagedError)
+
+KINDS: dict[str, Callable[[Path], Cases]] = {
+    **safety_damages.KINDS,
+    **safety_others.KINDS,
+    **safety_kills.KINDS,
+}
 
 
 def safety() -> list[dict[str, Any]]:
     """The rows: kind, case, outcome."""
     rows = []
-    for kind, cases in (("map", _maps), ("description", _descriptions), ("others", _others)):
+    for kind, cases in KINDS.items():
         with tempfile.TemporaryDirectory() as folder:
-            for case, outcome in cases(Path(folder)):
-                rows.append({"kind": kind, "case": case, "outcome": outcome})
+            usual = 0.0
+            for case, work in cases(Path(folder)):
+                said, took = _outcome(work, usual)
+                if not usual:
+                    usual = took  # the first case of a kind is undamaged
+                rows.append({"kind": kind, "case": case, "outcome": said})
     return rows
 
 
-def _outcome(work: Callable[[], bool], typed: tuple[type[Exception], ...] = (ArtoError,)) -> str:
-    """What comes of some work, which says whether its result is right. typed: the errors that the
-    work may raise."""
-    begun = time.monotonic()
+def _outcome(work: Work, usual: float) -> tuple[str, float]:
+    """What comes of some work, and the seconds of a processor that it took."""
+    begun = time.process_time()
+    tracemalloc.start()
     try:
-        said = "right" if work() else "wrong"
-    except typed:
+        with _alarm(60 * SECONDS):
+            said = "right" if work() else "wrong"
+    except TYPED:
         said = "typed error"
+    except safety_others.LostError:
+        said = "lost"
+    except TimeoutError:
+        said = "hang"
     except Exception:
         said = "traceback"
-    return "hang" if time.monotonic() - begun > SECONDS else said
+    finally:
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+    took = time.process_time() - begun
+    over = (usual and took > usual + SECONDS) or most > BYTES
+    return ("hang" if over else said), took
 
 
-def _damaged(good: bytes) -> list[tuple[str, bytes]]:
-    """Flipped bits, cuts and stretches of noise, the same ones each time."""
-    chance, out = random.Random(0), []
-    for n in range(DAMAGES):
-        bad, at = bytearray(good), chance.randrange(len(good))
-        if n % 3 == 0:
-            bad[at] ^= 1 << chance.randrange(8)
-        elif n % 3 == 1:
-            del bad[at:]
-        else:
-            bad[at : at + 8] = chance.randbytes(8)
-        out.append((f"{('bit', 'cut', 'noise')[n % 3]} at {at}", bytes(bad)))
-    return out
+@contextlib.contextmanager
+def _alarm(seconds: float) -> Iterator[None]:
+    """Raise TimeoutError in work that waits for ever, as for a pipe."""
+    if os.name == "nt":
+        yield
+        return
 
+    def late(*_: object) -> None:
+        raise TimeoutError
 
-def same(path: Path, image: np.ndarray) -> bool:
-    return np.array_equal(arrays.read(path, image.nbytes), image)
-
-
-def _maps(folder: Path) -> list[tuple[str, str]]:
-    path, image = folder / "map.npy", np.random.default_rng(0).random((8, 16, 3), np.float32)
-    arrays.write(path, image)
-    found = []
-    for case, bad in _damaged(path.read_bytes()):
-        path.write_bytes(bad)
-        found.append((case, _outcome(lambda: same(path, image), (OSError, ValueError))))
-    return found
-
-
-def _descriptions(folder: Path) -> list[tuple[str, str]]:
-    """A value that was changed to another that may be is read: a description has no digest."""
-    basis = np.ones((6, 3, 2, 3, 3), np.float32)
-    capture_set.write(folder, Hemicube(patches=1), pattern_set("linear"), basis, key="a")
-    path = folder / HEADER
-    good = path.read_bytes()
-    head, found = capture_set.CaptureSet(folder).head, []
-    for case, bad in _damaged(good):
-        path.write_bytes(bad)
-        same = _outcome(lambda: capture_set.CaptureSet(folder).head == head)
-        found.append((case, same))
-    return found
-
-
-def _others(folder: Path) -> list[tuple[str, str]]:
-    theirs = folder / "theirs"
-    theirs.mkdir()
-    file = theirs / "comp.nk"
-    file.write_text("mine")
-    lock = folder / "shot" / Lock.NAME
-    lock.parent.mkdir()
-    lock.symlink_to(file)
-    made = marked.make(folder / "made", "field")
-    (made / "link").symlink_to(theirs)
-    tries: dict[str, Callable[[], object]] = {
-        "remove": lambda: marked.remove(theirs, "field", folder),
-        "replace": lambda: replace_folder(marked.scratch(theirs, "field"), theirs),
-        "lock": lambda: Lock(lock.parent, "capturing").__enter__(),
-        "holder": lambda: Lock.holder(lock.parent) == "",
-        "links within": lambda: marked.remove(made, "field", folder) is None,
-    }
-    found = []
-    for case, work in tries.items():
-        said = _outcome(lambda work=work: bool(work()))
-        kept = os.path.lexists(file) and file.read_text() == "mine"
-        found.append((case, said if kept else "lost"))
-    return found
+    before = signal.signal(signal.SIGALRM, late)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
 
 
 def table(rows: list[dict[str, Any]]) -> str:

@@ -19,6 +19,7 @@ from __future__ import annotations
 import io
 import math
 import tokenize
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -53,7 +54,7 @@ def write(path: Path, array: NDArray) -> None:
     np.save(data, np.ascontiguousarray(array))
     with whole(path) as partial, partial.open("wb") as f:
         f.write(data.getbuffer())
-        f.write(_BEFORE + _digest(data.getbuffer()) + _AFTER)
+        f.write(_BEFORE + _digest(path, data.getbuffer()) + _AFTER)
 
 
 def read(path: Path, most: int, signed: bool = True) -> NDArray:
@@ -84,7 +85,7 @@ def read(path: Path, most: int, signed: bool = True) -> NDArray:
     if signed:
         end -= _TAIL
         tail = data[max(end, 0) :]
-        if tail != _BEFORE + _digest(memoryview(data)[: max(end, 0)]) + _AFTER:
+        if tail != _BEFORE + _digest(path, memoryview(data)[: max(end, 0)]) + _AFTER:
             raise ValueError(f"{path} is not what was written: its digest differs")
     shape, dtype, first = head(data[: min(end, LONGEST_HEAD)])
     if first + math.prod(shape) * dtype.itemsize != end:
@@ -150,6 +151,10 @@ def is_signed(path: Path) -> bool:
     return len(tail) == _TAIL and tail.startswith(_BEFORE) and tail.endswith(_AFTER)
 
 
-def _digest(data: memoryview | bytes) -> bytes:
-    # of a map of 4096 x 2048 texels, a cryptographic digest takes four times as long as the reading
-    return f"{crc32(data):0{_DIGITS}x}".encode()
+def _digest(path: Path, data: memoryview) -> bytes:
+    """The checksum of an array, and that of its file's name: an array of another name is another.
+
+    Of a map of 4096 x 2048 texels, a cryptographic digest would take four times as long as reading.
+    """
+    name = zlib.crc32(path.name.encode("utf-8", "surrogatepass"))
+    return f"{crc32(data):08x}{name:08x}".rjust(_DIGITS, "0").encode()

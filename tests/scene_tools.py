@@ -70,6 +70,7 @@ def small_scene(folder: Path, lamp: bool = False) -> bpy.types.Scene:
     settings = scene.arto
     settings.folder = str(folder / "arto")
     settings.output = str(folder / "relit.exr")
+    settings.depth = "FLOAT"  # so that pictures can be compared closely
     settings.samples, settings.patches, settings.keep = 64, 1, "always"
     settings.patterns, settings.grain, settings.adaptive = "moments", True, False
     # the one thing of the artist's that a capture adds to is the scene's ID

@@ -39,6 +39,8 @@ class Settings:
     write_data: bool
     cryptomatte: str
     shadows: Literal["MULTIPLY", "ADD"]
+    compression: Literal["ZIPS", "ZIP", "DWAA"]
+    depth: Literal["HALF", "FLOAT"]
     data_window: Literal["FULL", "CROP"]
     overscan: int
     use_in_compositor: Literal["VIEWER", "RENDER"]

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import platform
+import re
 import time
+from fractions import Fraction
 
 import bpy
 
+from ...core.exr import TimeCode
 from ..blender.markers import camera_of
 from ..shot import home
 
@@ -43,4 +46,17 @@ def header(scene: bpy.types.Scene) -> dict[str, object]:
     }
     found["Software"] = f"Blender {bpy.app.version_string}"
     found["pixelAspectRatio"] = float(render.pixel_aspect_x / render.pixel_aspect_y)
+    # 24 over 1.001: the base is a float of 32 bits
+    found["framesPerSecond"] = render.fps / Fraction(render.fps_base).limit_denominator(1000)
+    if render.use_stamp_time and (moment := time_code(fields["time"][1])):
+        found["timeCode"] = moment
     return found
+
+
+def time_code(text: str) -> TimeCode | None:
+    """The moment that Blender writes as `01:02:03:04`; None where an EXR has no such moment."""
+    found = re.fullmatch(r"(\d\d):(\d\d):(\d\d):(\d\d)", text)
+    moment = [int(part) for part in found.groups()] if found else [99]
+    if moment[0] > 23 or max(moment[1:]) > 59:
+        return None
+    return TimeCode(*moment)

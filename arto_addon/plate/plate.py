@@ -50,10 +50,13 @@ def write(
     window = window_of(scene)
     attributes, space = header_of(scene, about)
     named = attributes | ({CROPPED: full_file(path).name} if window.crop and shows else {})
-    exr.write(path, {"": picture}, named, space, window, opener=opener)
+    (stored,) = exr.as_half(picture) if scene.arto.depth == "HALF" else [picture]
+    by = scene.arto.compression
+    exr.write(path, {"": stored}, named, space, window, opener=opener, compression=by)
     if window.crop and shows:
         full = replace(window, crop=False)
-        exr.write(full_file(path), {"": picture}, attributes, space, full, opener=opener)
+        copy = full_file(path)
+        exr.write(copy, {"": stored}, attributes, space, full, opener=opener, compression=by)
 
 
 def window_of(scene: bpy.types.Scene) -> Window:
@@ -160,8 +163,10 @@ def write_data(
         parts[MATTES] = mattes.planes
         attributes |= mattes.about
     if parts:
-        window = window_of(scene)
-        exr.write_planes(data_file(path), parts, attributes, window, [MATTES], opener)
+        # what is no colour must come back to the bit
+        by = "ZIPS" if scene.arto.compression == "DWAA" else scene.arto.compression
+        named, colours = (data_file(path), parts, attributes), {"albedo": working_space()}
+        exr.write_planes(*named, window_of(scene), [MATTES], opener, by, colours)
     return missing
 
 

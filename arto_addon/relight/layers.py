@@ -51,8 +51,6 @@ OWN, BEHIND = "own", "behind"
 SOCKETS = {"Exposure", "Footage", "Image", "Combined", "Alpha"}
 # A part of the light with less than this share of the lamps' light is given no lamps.
 LEAST_LAMPS = 1e-4
-# The largest number that a half float holds.
-HALF = 65504.0
 
 
 def check(scene: bpy.types.Scene, path: Path, field: Field) -> None:
@@ -191,7 +189,7 @@ def write(
     parts = share_out(list(layers.values()), beauty[..., :3])
     kind = np.float32
     if settings.layers_half:
-        if max(float(np.max(p, initial=0)) for p in [*parts, beauty]) <= HALF:
+        if max(float(np.max(p, initial=0)) for p in [*parts, beauty]) <= exr.HALF:
             kind = np.float16
         else:
             yield Warned(0.95, "the layers are written as 32-bit: light past what half holds")
@@ -199,20 +197,20 @@ def write(
     picture = beauty.astype(kind)
     off = residual(stored, picture[..., :3].astype(np.float64))
     named = dict(zip(names, stored, strict=True))
-    window = window_of(scene)
+    window, by = window_of(scene), settings.compression
     for name, file in files.items():
         one = np.dstack([named[name], picture[..., 3]])
         said = attributes | {"arto.layer": name}
-        exr.write(file, {"": one}, said, space, window, opener=opener)
+        exr.write(file, {"": one}, said, space, window, opener=opener, compression=by)
     together = layers_file(path)
     shown = full_file(together) if window.crop else together
     if not each:
         said = attributes | ({CROPPED: shown.name} if window.crop else {})
-        exr.write_layered(together, picture, named, said, space, window, opener)
+        exr.write_layered(together, picture, named, said, space, window, opener, by)
     # the mixer reads all layers and all their pixels from one file
     if window.crop if not each else path == relit_file(scene):
         full = replace(window, crop=False)
-        exr.write_layered(shown, picture, named, attributes, space, full, opener)
+        exr.write_layered(shown, picture, named, attributes, space, full, opener, by)
     yield Progress(0.95, f"layers: {', '.join(named)}; their sum is off by {off:.1e} at most")
 
 

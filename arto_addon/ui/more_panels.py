@@ -110,6 +110,8 @@ class Storage(Draws):
         column.prop(settings, "folder", text="")
         say(column, context, "Relit Picture")
         column.prop(settings, "output", text="")
+        column.prop(settings, "compression", text="")
+        column.prop(settings, "depth", text="")
         column.prop(settings, "keep", text="")
         if settings.keep == Keep.FITS:
             column.prop(settings, "keep_limit")

@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.capture.names import is_combined
 from ...core.errors import FieldError, SceneError
 from ...core.field.field import Field
 from ...core.light.environment import Environment
@@ -82,7 +83,14 @@ def lamp_light(
     with _lit_by(scene, field, lamps) as (on, group):
         on.change("cycles.samples", samples)
         parts = yield from parts_of(on, "rendering the world's lamps", share)
-        out[region.slices] = _light_in(parts, group)
+        light = _light_in(parts, group)
+        # At an outline a few paths hit what no path of the capture hit: light without alpha, which
+        # stands beside the thing in a composite. Where neither has alpha the light is a volume's.
+        whole = next((p for name, p in parts.items() if is_combined(name)), None)
+        if whole is not None and whole.shape[-1] == 4:
+            missed = field.layer("alpha")[region.slices] == 0
+            light = np.where((missed & (whole[..., 3] > 0))[..., None], np.float32(0), light)
+        out[region.slices] = light
     return out
 
 

@@ -8,10 +8,14 @@ from __future__ import annotations
 
 from .layers import Layers
 from .reading import header, part_names, parts, read, whole_parts, windows
-from .writing import write, write_layered, write_planes
+from .writing import COMPRESSIONS, HALF, TimeCode, as_half, write, write_layered, write_planes
 
 __all__ = [
+    "COMPRESSIONS",
+    "HALF",
     "Layers",
+    "TimeCode",
+    "as_half",
     "header",
     "part_names",
     "parts",

@@ -17,8 +17,9 @@ Examples
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,45 @@ COLOUR_SPACES = {
 }
 
 
+# The compressions of a plate, by the names that other programs have for them. ZIPS has a line of
+# pixels in a chunk, which compositing reads fastest; DWAA is not exact.
+COMPRESSIONS = ("ZIPS", "ZIP", "DWAA")
+# The largest number that a half float holds.
+HALF = 65504.0
+
+
+@dataclass(frozen=True)
+class TimeCode:
+    """A moment of an edit.
+
+    Parameters
+    ----------
+    hours, minutes, seconds, frame : int
+        Up to 23, 59, 59 and 59.
+    """
+
+    hours: int
+    minutes: int
+    seconds: int
+    frame: int
+
+
+def as_half(*pictures: NDArray) -> list[NDArray]:
+    """Bring pictures to half floats, where all of their light fits.
+
+    Parameters
+    ----------
+    *pictures : array
+
+    Returns
+    -------
+    list of array
+        float16, or the pictures as they are where one has more than half floats hold.
+    """
+    fit = all(np.abs(picture).max(initial=0) <= HALF for picture in pictures)
+    return [picture.astype(np.float16) if fit else picture for picture in pictures]
+
+
 def write(
     path: Path,
     layers: dict[str, NDArray],
@@ -50,8 +90,9 @@ def write(
     window: Window = FULL,
     finite: bool = True,
     opener: Opener = whole,
+    compression: str = "ZIP",
 ) -> None:
-    """Write layers, each as a part of its own, with ZIP compression.
+    """Write layers, each as a part of its own.
 
     A single layer of the name '' makes an ordinary file of one part.
 
@@ -69,6 +110,8 @@ def write(
         Whether pixels that are infinite or not a number are refused.
     opener : Opener, optional
         How the file is put in its place; by default as soon as it is complete.
+    compression : str
+        One of `COMPRESSIONS`.
 
     Raises
     ------
@@ -79,7 +122,7 @@ def write(
     parts = [(name, _channels(pixels)) for name, pixels in layers.items()]
     if finite:
         _check_finite(path, parts)
-    _write(path, parts, attributes, colour_space, window, opener)
+    _write(path, parts, attributes, colour_space, window, opener, compression)
 
 
 def write_planes(
@@ -89,6 +132,8 @@ def write_planes(
     window: Window = FULL,
     handed_on: Collection[str] = (),
     opener: Opener = whole,
+    compression: str = "ZIP",
+    colours: Mapping[str, str] | None = None,
 ) -> None:
     """Write data that is no colour, as planes of 32-bit floats in parts.
 
@@ -104,6 +149,10 @@ def write_planes(
         The parts that are another program's, whatever is in them.
     opener : Opener, optional
         How the file is put in its place; by default as soon as it is complete.
+    compression : str
+        One of `COMPRESSIONS`.
+    colours : dict of str to str, optional
+        Of parts that are colours all the same, Blender's name of their space.
 
     Raises
     ------
@@ -115,7 +164,8 @@ def write_planes(
         for part, channels in parts.items()
     }
     _check_finite(path, [part for part in planes.items() if part[0] not in handed_on])
-    _write(path, list(planes.items()), attributes, "Non-Color", window, opener)
+    named = list(planes.items())
+    _write(path, named, attributes, "Non-Color", window, opener, compression, colours or {})
 
 
 def write_layered(
@@ -126,6 +176,7 @@ def write_layered(
     colour_space: str = "Linear Rec.709",
     window: Window = FULL,
     opener: Opener = whole,
+    compression: str = "ZIP",
 ) -> None:
     """Write a picture and layers of it into one part, as compositing programs expect.
 
@@ -144,6 +195,8 @@ def write_layered(
     window : Window
     opener : Opener, optional
         How the file is put in its place; by default as soon as it is complete.
+    compression : str
+        One of `COMPRESSIONS`.
 
     Raises
     ------
@@ -154,7 +207,7 @@ def write_layered(
     for name, pixels in layers.items():
         channels |= {f"{name}.{c}": plane for c, plane in _channels(pixels).items()}
     _check_finite(path, [("", channels)])
-    _write(path, [("", channels)], attributes, colour_space, window, opener)
+    _write(path, [("", channels)], attributes, colour_space, window, opener, compression)
 
 
 def _check_finite(path: Path, parts: Iterable[tuple[str, dict[str, NDArray]]]) -> None:
@@ -189,16 +242,25 @@ def _write(
     colour_space: str,
     window: Window,
     opener: Opener,
+    compression: str,
+    colours: Mapping[str, str] | None = None,
 ) -> None:
     exr = openexr()
-    head = {"compression": exr.ZIP_COMPRESSION, "type": exr.scanlineimage}
-    if colour_space in COLOUR_SPACES:
-        head["colorInteropID"] = COLOUR_SPACES[colour_space]
-    head["colorSpace"] = colour_space
+    common = {
+        "compression": getattr(exr, f"{compression}_COMPRESSION"),
+        "type": exr.scanlineimage,
+        **{name: _attribute(value) for name, value in (attributes or {}).items()},
+    }
     if window != FULL:
         parts, windows = window.put(parts)
-        head |= windows
-    made = [exr.Part({**head, **(attributes or {})}, channels, name) for name, channels in parts]
+        common = windows | common
+    made = []
+    for name, channels in parts:
+        space = (colours or {}).get(name, colour_space)
+        head = {"colorSpace": space}
+        if space in COLOUR_SPACES:
+            head["colorInteropID"] = COLOUR_SPACES[space]
+        made.append(exr.Part(head | common, channels, name))
     try:
         with opener(path) as partial:
             exr.File(made).write(str(partial))
@@ -212,3 +274,11 @@ def _write(
             f"{path} cannot be written ({e}): make room on the disk, or choose a folder that "
             "can be written"
         ) from e
+
+
+def _attribute(value: Any) -> Any:
+    """An attribute of a header, as the library has it; it takes a Fraction as it is."""
+    if isinstance(value, TimeCode):
+        moment = value.hours, value.minutes, value.seconds, value.frame
+        return openexr().TimeCode(*moment, *[False] * 6, *[0] * 8)
+    return value

@@ -87,6 +87,8 @@ def test_with_its_lamps_the_plate_is_what_cycles_renders(shot, tmp_path):
     assert error < np.abs(blurred[..., :3] - truth)[alpha].mean() / 2
     assert picture[..., :3][alpha].mean() == pytest.approx(truth[alpha].mean(), rel=0.02)
     assert "of the world's light" in said and nothing == "no"
+    # no light stands where nothing is: a composite would add it to what is behind
+    assert not picture[picture[..., 3] == 0].any()
 
 
 @pytest.mark.newest

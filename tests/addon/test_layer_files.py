@@ -35,7 +35,7 @@ def test_a_reader_that_knows_nothing_of_arto(lit):
     assert (
         spec["colorInteropID"] == "lin_rec709_scene" and spec.getattribute("chromaticities") is None
     )
-    assert spec["compression"] == "zip"
+    assert spec["compression"] == "zips"
     pixels = file.read_image("float")
     for i, c in enumerate("RGB"):
         mine = [n for n, name in enumerate(spec.channelnames) if name.endswith(f".{c}")]

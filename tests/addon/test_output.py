@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
 
 import bpy
@@ -158,6 +159,7 @@ def test_the_header_says_what_blenders_own_does(tmp_path):
     r.use_stamp_camera = False
     scene.timeline_markers.new("take 2", frame=1)
     scene.frame_set(7)
+    r.fps, r.fps_base = 24, 1.001
     captured(scene)
     work.run(fit.fit(scene))
     plate, _ = work.run(relight.relight(scene))
@@ -172,3 +174,5 @@ def test_the_header_says_what_blenders_own_does(tmp_path):
     assert {n: found.get(n) for n in told} == {n: own[n] for n in told}
     assert found["pixelAspectRatio"] == own["pixelAspectRatio"]
     assert abs(len(found["Date"]) - len(own["Date"])) == 0
+    assert found["framesPerSecond"] == Fraction(24000, 1001)
+    assert str(found["timeCode"]).startswith("(0, 0, 0, 7")

@@ -25,6 +25,15 @@ def test_an_array_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert np.array_equal(arrays.read(tmp_path / "theirs.npy", image.nbytes, signed=False), image)
 
 
+def test_an_array_in_the_place_of_another_is_found(tmp_path: Path) -> None:
+    """Each is whole: it has another name."""
+    for name in ("a.npy", "b.npy"):
+        arrays.write(tmp_path / name, np.full((2, 3), ord(name[0]), np.float32))
+    (tmp_path / "a.npy").replace(tmp_path / "b.npy")
+    with pytest.raises(ValueError, match="not what was written"):
+        arrays.read(tmp_path / "b.npy", LARGE)
+
+
 def test_every_flipped_bit_is_found(tmp_path: Path) -> None:
     path = tmp_path / "a.npy"
     arrays.write(path, np.arange(24, dtype=np.float32).reshape(2, 4, 3))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -60,6 +61,39 @@ def test_no_picture_is_written_with_what_is_no_number(tmp_path: Path, bad: float
             write()
     assert path.read_bytes() == kept
     exr.write_planes(path, parts, {}, handed_on=["position"])
+
+
+@pytest.mark.parametrize("compression", exr.COMPRESSIONS)
+def test_a_plate_is_packed_as_it_is_asked_for(tmp_path: Path, compression: str) -> None:
+    rng, path = np.random.default_rng(0), tmp_path / "a.exr"
+    (picture,) = exr.as_half(rng.random((40, 50, 4), np.float32))
+    exr.write(path, {"": picture}, compression=compression)
+    head = OpenEXR.File(str(path), header_only=True).header()
+    assert head["compression"] == getattr(OpenEXR, f"{compression}_COMPRESSION")
+    found = exr.read(path)[""]
+    off = np.abs(found.astype(np.float32) - picture.astype(np.float32)).max()
+    assert found.dtype == np.float16 and (0 < off < 0.1 if compression == "DWAA" else off == 0)
+
+
+def test_half_is_taken_where_all_of_the_light_fits() -> None:
+    for most, kind in ((65504, np.float16), (65600, np.float32), (-65600, np.float32)):
+        pictures = [np.ones((2, 2)), np.full((2, 2), most, np.float32)]
+        assert exr.as_half(*pictures)[1].dtype == kind
+
+
+def test_the_speed_and_the_moment_are_in_the_header(tmp_path: Path) -> None:
+    """Of the types that EXR has for them, in each part."""
+    path, plane = tmp_path / "a.exr", np.ones((3, 4))
+    about = {"framesPerSecond": Fraction(24000, 1001), "timeCode": exr.TimeCode(1, 2, 3, 4)}
+    parts = {"albedo": dict.fromkeys("RGB", plane), "depth": {"Z": plane}}
+    exr.write_planes(path, parts, about, colours={"albedo": "ACEScg"}, compression="ZIPS")
+    one, two = (part.header for part in OpenEXR.File(str(path), header_only=True).parts)
+    for head in (one, two):
+        moment = head["timeCode"]
+        assert head["framesPerSecond"] == Fraction(24000, 1001)
+        assert (moment.hours, moment.minutes, moment.seconds, moment.frame) == (1, 2, 3, 4)
+    # albedo is a colour, depth is not
+    assert one["colorInteropID"] == "lin_ap1_scene" and two["colorInteropID"] == "data"
 
 
 def test_half_stays_half_and_double_becomes_float(tmp_path: Path) -> None:
