@@ -22,6 +22,7 @@ import platform
 import secrets
 import stat
 import time
+from io import BufferedReader
 from pathlib import Path
 from typing import IO, Any
 
@@ -43,7 +44,7 @@ _JUNCTION = 0xA0000003
 _LONGEST = 180
 
 
-def open_regular(path: Path, follow: bool = False) -> IO[bytes]:
+def open_regular(path: Path, follow: bool = False) -> BufferedReader:
     """Open a regular file for reading, without waiting.
 
     Parameters
