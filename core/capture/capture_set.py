@@ -1,8 +1,21 @@
 """The capture set: the basis images on disk, and what made them (paper 4).
 
-A folder with `capture.json` and EXR files. A basis image is the part of a file whose name ends in
-`Combined_ARTO_<patch>_<pattern>`, as Blender names a light group's pass; other parts are the whole
-picture (`Combined`, with alpha) and its albedo, normal and depth: docs/capture-format.md.
+A capture set is a folder with `capture.json` and EXR files, see docs/capture-format.md. A basis
+image is the part of a file whose name ends in `Combined_ARTO_<patch>_<pattern>`, as Blender names a
+light group's pass. Other parts are the whole picture (`Combined`, with alpha) and its albedo,
+normal and depth.
+
+Examples
+--------
+>>> import tempfile
+>>> from arto.core.patterns import pattern_set
+>>> cube = Hemicube(patches=1)
+>>> with tempfile.TemporaryDirectory() as folder:
+...     write(Path(folder), cube, pattern_set("white"), np.full((6, 1, 4, 8, 3), 0.5))
+...     there = CaptureSet(Path(folder))
+...     tile = there.read(0)
+>>> there.shape, tile.basis.shape, float(tile.basis.max()), float(tile.own.max())
+((4, 8), (6, 1, 4, 8, 3), 0.5, 0.0)
 """
 
 from __future__ import annotations
@@ -32,13 +45,17 @@ class CaptureSet:
 
     Parameters
     ----------
-    folder : that the set is in.
-    unfinished : whether some of its tiles may not be rendered yet.
-    head : its head, where it is not to be read from the folder.
+    folder : Path
+        The set's.
+    unfinished : bool
+        Whether tiles may be missing that are not rendered yet.
+    head : CaptureHead, optional
+        The set's head, where it is not to be read from the folder.
 
     Raises
     ------
-    CaptureSetError : if it is missing, damaged, unfinished, or of another version.
+    CaptureSetError
+        The set is missing, damaged, unfinished, or of another version.
     """
 
     def __init__(
@@ -55,10 +72,12 @@ class CaptureSet:
 
     @property
     def hemicube(self) -> Hemicube:
+        """The patches that were lit."""
         return self.head.hemicube
 
     @property
     def patterns(self) -> PatternSet:
+        """The patterns that the patches showed."""
         return self.head.patterns
 
     @property
@@ -68,11 +87,12 @@ class CaptureSet:
 
     @property
     def regions(self) -> tuple[Region, ...]:
+        """The places of the tiles in the picture."""
         return tuple(tile.region for tile in self.head.tiles)
 
     @property
     def files(self) -> tuple[tuple[str, ...], ...]:
-        """Of each tile the names of its files."""
+        """The names of the files of each tile."""
         return tuple(tile.files for tile in self.head.tiles)
 
     @property
@@ -82,16 +102,33 @@ class CaptureSet:
 
     @property
     def pixels(self) -> int:
+        """The number of pixels of all tiles."""
         return sum(r.pixels for r in self.regions)
 
     @property
     def kept(self) -> bool:
-        """Whether the basis images are still there: once fitted, they may go."""
+        """Whether the basis images stay once they were fitted."""
         return self.head.kept is not False
 
     def open(self, tile: int) -> BasisImages:
-        """The basis images of a tile, to be read patch by patch; to be closed. Raises
-        CaptureSetError for whatever would bend the light, here or when it is read."""
+        """Open the basis images of a tile, to be read patch by patch.
+
+        Parameters
+        ----------
+        tile : int
+            The tile's number.
+
+        Returns
+        -------
+        BasisImages
+            The caller closes them.
+
+        Raises
+        ------
+        CaptureSetError
+            The images were not kept, are missing, or hold what is no light. Some of this is found
+            only when the images are read.
+        """
         entry = self.head.tiles[tile]
         if not self.kept and not entry.files:
             raise CaptureSetError(
@@ -112,7 +149,22 @@ class CaptureSet:
         )
 
     def read(self, tile: int) -> TileData:
-        """All of a tile at once. Raises CaptureSetError."""
+        """Read all of a tile at once.
+
+        Parameters
+        ----------
+        tile : int
+            The tile's number.
+
+        Returns
+        -------
+        TileData
+
+        Raises
+        ------
+        CaptureSetError
+            As `open`.
+        """
         with self.open(tile) as images:
             return images.read()
 
@@ -126,10 +178,30 @@ def write(
     alpha: NDArray | None = None,
     **about: Any,
 ) -> None:
-    """Write basis images (K, P, H, W, 3), photographs for example, as a capture set of one tile.
+    """Write basis images, for example photographs, as a capture set of one tile.
 
-    own: (H, W, 3), the light that is always there (default none); alpha: (H, W) (default 1);
-    about: what else `capture.json` says, as it says it. Raises CaptureSetError.
+    Parameters
+    ----------
+    folder : Path
+    hemicube : Hemicube
+        K patches.
+    patterns : PatternSet
+        P patterns.
+    basis : (K, P, H, W, 3) float
+        Scene-linear: the picture when one patch shows one pattern.
+    own : (H, W, 3) float, optional
+        The light that is always there; by default none.
+    alpha : (H, W) float, optional
+        By default 1.
+    **about : object
+        What else `capture.json` says, by its names there.
+
+    Raises
+    ------
+    CaptureSetError
+        The folder cannot be written, or `about` has a value that cannot be right.
+    ExrError
+        The images cannot be written.
     """
     shape = basis.shape[2:4]
     combined = np.ones((*shape, 4), np.float32)

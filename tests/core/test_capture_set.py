@@ -324,7 +324,8 @@ def test_a_pixel_that_outshines_all_light_is_refused(folder: Path) -> None:
 
 def test_a_negative_zero_is_no_error(folder: Path) -> None:
     change(folder, **{PART: np.full((6, 8, 3), -0.0)})
-    CaptureSet(folder).read(0)
+    there = CaptureSet(folder)
+    assert (there.read(0).basis[3, there.patterns.patterns.index("u2")] == 0).all()
 
 
 def test_a_header_that_cannot_be_written(read_only: Path, tmp_path: Path) -> None:

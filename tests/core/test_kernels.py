@@ -74,6 +74,7 @@ def test_the_proxies_of_a_tile(tile: TileWriter, benchmark) -> None:
     found = benchmark(proxy.proxies, tile, CUBE)
     light = {f: sum(float(m[2].sum()) for m in p.models[LINEAR.code]) for f, p in found.items()}
     total = sum(float(m[2].sum()) for m in tile.models[LINEAR.code])
+    assert list(light) == [2, 4, 8]
     for factor, some in light.items():
         assert some * factor**2 == pytest.approx(total, rel=1e-4)
 
