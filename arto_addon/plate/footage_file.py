@@ -58,6 +58,14 @@ def check(source: Any, timing: Any, frame: int) -> str:
             f"the footage '{source.name}' of frame {frame} cannot be used ({wrong}): put the file "
             "there, or choose other footage"
         )
+    number = number_of(path)
+    if source.source == "FILE" and number not in (None, frame):
+        own = file_of(path, frame)
+        if own != path and own.is_file():
+            return (
+                f"the footage '{source.name}' is a single picture, and {own.name} is beside it: "
+                "set its source to Image Sequence, if it is one"
+            )
     if source.source == "SEQUENCE" and path != file and path.is_file():
         here, there = _size(file, _state(file)), _size(path, _state(path))
         if here and there and here != there:

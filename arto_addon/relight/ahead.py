@@ -90,11 +90,12 @@ def look(
     The scene is put back to its frame. strict: whether the scene may not have changed since the
     capture.
     """
-    wrong = _names(pictures)
+    wrong = same_names(pictures)
     wrong |= {p: e for p in pictures if p.file and p not in wrong and (e := _map(p.file))}
     missing = missing_frames(scene, view_layer, [p.frame for p in pictures if p.frame is not None])
     still = None
     needed: dict[Path, int] = {}
+    rendered: dict[Path, int] = {}
     with frame_kept(scene):
         for number, frame in enumerate(every := list(dict.fromkeys(p.frame for p in pictures))):
             some = [p for p in pictures if p.frame == frame and p not in wrong]
@@ -107,6 +108,7 @@ def look(
                     if frame in missing:
                         raise missing[frame]
                 still = shown_at(scene, view_layer, still)
+                _check_mattes(still, rendered)
                 check_frame(still, own_world=any(p.file is None for p in some), strict=strict)
             except ArtoError as e:
                 wrong |= dict.fromkeys(some, e)
@@ -124,8 +126,8 @@ def look(
     return wrong
 
 
-def _names(pictures: Sequence[Wanted]) -> dict[Wanted, ArtoError]:
-    """Pictures that would be written over another one."""
+def same_names(pictures: Sequence[Wanted]) -> dict[Wanted, ArtoError]:
+    """Find pictures that would be written over another one -> what is wrong, by picture."""
     by_name: dict[str, list[Wanted]] = {}
     for one in pictures:
         # Windows and macOS do not tell upper from lower case in names
@@ -198,6 +200,36 @@ def shown_at(scene: bpy.types.Scene, view_layer: str, still: Shown | None) -> Sh
             f"{difference}: capture it too (--frames)"
         )
     return still
+
+
+def _check_mattes(shown: Shown, rendered: dict[Path, int]) -> None:
+    """Raise SceneError where one file of Cryptomattes is named for several captured frames.
+
+    rendered: the frame by the file, for those that were looked at before; added to.
+    """
+    path, shot = mattes.file_of(shown.scene, shown.field), shown.field.about.shot
+    if path and shot and rendered.setdefault(path, shot.frame) != shot.frame:
+        raise SceneError(
+            f"{path} is named for frame {rendered[path]} and for frame {shot.frame}: write #### "
+            "for the frame's number in Cryptomatte"
+        )
+
+
+def check_looks(shown: Shown, looks: Mapping[str, tuple[Path, bpy.types.World]]) -> None:
+    """Look at all that the pictures of some looks need.
+
+    looks: the path of the picture, and the world, by the look's name. Raises ArtoError.
+    """
+    check_frame(shown, own_world=False, strict=False)
+    by_path: dict[str, str] = {}
+    for name, (path, world) in looks.items():
+        if (other := by_path.setdefault(str(path).casefold(), name)) != name:
+            raise SceneError(
+                f"the looks '{other}' and '{name}' would be written to one picture, {path.name}: "
+                "give one of them another name"
+            )
+        check_picture(shown, path, world)
+        check_images(world, shown.scene.frame_current)
 
 
 def check_frame(shown: Shown, own_world: bool, strict: bool) -> None:

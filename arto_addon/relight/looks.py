@@ -13,6 +13,7 @@ from ..plate.present import present
 from ..shot.shot import check_same_shot, layer_of
 from ..work import Progress, Steps
 from ..world.check import world_of
+from . import ahead
 from .relight import finish, make_ready
 from .shown import Light, Ready, Shown
 
@@ -99,6 +100,7 @@ def relight_looks(scene: bpy.types.Scene, view_layer: str) -> Steps[list[Path]]:
     scene.view_layers[view_layer].update()
     shown = Shown(scene, view_layer)
     check_same_shot(scene, shown.field.about.shot, "the reflectance field", view_layer)
+    ahead.check_looks(shown, {k.name: (relit_file(scene, k.name), k.world) for k in looks})
     most = max(1, together(shown.field) // len(shown.takes))
     done = []
     for first in range(0, len(looks), most):

@@ -76,11 +76,12 @@ class Shown:
             if not folder.exists() and not paths.capture_folder(scene, view_layer).exists():
                 near = paths.nearest(scene, view_layer)
                 check_same_shot(scene, near, "the reflectance field", view_layer)
-                if near is None and (others := paths.alike(scene, view_layer)):
+                other = paths.alike(scene, view_layer) if near is None else None
+                if other:
                     raise FieldError(
-                        f"there is no reflectance field of this shot. {others[0]} was captured of "
-                        f"a scene of the same name: if that is this scene, use it by --command "
-                        f"arto adopt --from '{others[0]}'; else capture this one"
+                        f"there is no reflectance field of this shot. What is in {other} was "
+                        f"captured of a scene of the same name: if that is this scene, use it by "
+                        f"--command arto adopt --from '{other}'; else capture this one"
                     )
         self.field = Field(folder)
         self._changed: dict[tuple[int, float], list[str]] = {}

@@ -187,16 +187,21 @@ def all_in(folder: Path) -> list[tuple[Path, Shot]]:
     return found
 
 
-def alike(scene: bpy.types.Scene, view_layer: str) -> list[Path]:
-    """Find captured shots of scenes with this one's name that are not known to be of this scene.
+def alike(scene: bpy.types.Scene, view_layer: str) -> Path | None:
+    """Find captured shots of a scene with this one's name that is not known to be this scene.
 
-    They are of its camera and view layer. Raises SceneError, OSError.
+    They are of its camera and view layer. Returns the folder of the one shot, or the folder above
+    several; None where there are none. Raises SceneError, OSError.
     """
     shot = shot_of(scene, view_layer)
     names = shot.scene, shot.view_layer, shot.camera
     found = [(p, s) for p, s in all_in(_root(scene)) if not _same_scene(shot, s)]
     some = [(p, s) for p, s in found if (s.scene, s.view_layer, s.camera) == names]
-    return [path for path, _ in sorted(some, key=lambda each: abs(each[1].frame - shot.frame))]
+    near = [path for path, _ in sorted(some, key=lambda each: abs(each[1].frame - shot.frame))]
+    if not near:
+        return None
+    beside = [path for path in near if path.parent == near[0].parent]
+    return near[0] if len(beside) == 1 else near[0].parent
 
 
 def frames(scene: bpy.types.Scene, view_layer: str) -> dict[float, bool]:

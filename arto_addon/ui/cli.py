@@ -212,10 +212,10 @@ def _adopt(scene: bpy.types.Scene, layer: str, source: Path | None) -> None:
         return
     place = paths.place(scene, layer)
     if not place.owner:
-        others = paths.alike(scene, layer)
+        other = paths.alike(scene, layer)
         raise SceneError(
             "there is nothing of another file or scene to use"
-            + (f": name it, as in --from '{others[0]}'" if others else "")
+            + (f": name it, as in --from '{other}'" if other else "")
         )
     print(f"ARTO adopt: {adopt(scene, layer, place.source)}", flush=True)
 

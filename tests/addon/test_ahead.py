@@ -10,6 +10,7 @@ import pytest
 from arto.arto_addon import work
 from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.relight import ahead, many
+from arto.arto_addon.relight.looks import relight_looks
 from arto.arto_addon.work import Batch, Failed, Warned, Wrote
 from arto.core import exr
 from arto.core.errors import ArtoError, ExrError, SceneError, StrictError
@@ -171,3 +172,17 @@ def test_frames_of_a_world_with_a_gap_are_found_first(shot, tmp_path):
         assert said.error is None and said.wrote == ["shot_relit_0004.exr"]
     finally:
         texture.image = theirs
+
+
+def test_two_looks_of_one_picture_are_refused(shot):
+    """Their names differ, those of their files do not."""
+    for name in ("A/B", "A_B"):
+        entry = shot.arto.looks.add()
+        entry.name, entry.world = name, shot.world
+    try:
+        with pytest.raises(SceneError, match="one picture"):
+            work.run(relight_looks(shot, shot.view_layers[0].name))
+    finally:
+        shot.arto.looks.clear()
+        shot.arto.look = ""
+    assert not pictures(shot)

@@ -233,6 +233,15 @@ def test_footage_that_does_not_last_is_warned_of(tmp_path):
     assert footage(scene).shown(scene) == "filmed_0001.png"
 
 
+def test_one_picture_of_a_sequence_is_warned_of(tmp_path):
+    """Chosen as a single image, it would be behind all frames."""
+    scene = small_scene(tmp_path)
+    scene.arto.footage = bpy.data.images.load(str(sequence(tmp_path, "png")))
+    for frame, warns in ((1, False), (2, True), (7, False)):
+        scene.frame_set(frame)
+        assert ("Image Sequence" in footage(scene).check(scene)) == warns
+
+
 @pytest.mark.parametrize("what", ["truncated", "nan"])
 def test_footage_that_is_no_picture_is_said_before_anything_is_written(tmp_path, what):
     scene = with_catcher(tmp_path, samples=4, patches=1)

@@ -255,7 +255,7 @@ def test_two_worlds_of_one_name_are_refused_before_work(tmp_path):
 
     def wrong(*worlds):
         pictures = ahead.wanted(scene, worlds, 1, ())
-        found = ahead._names(pictures)
+        found = ahead.same_names(pictures)
         return [str(found.get(p) or ahead._map(p.file) or "") for p in pictures]
 
     assert wrong(a, other) == ["", ""]

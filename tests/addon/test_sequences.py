@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from arto.arto_addon import work
 from arto.arto_addon.capture import sequence
@@ -9,6 +10,7 @@ from arto.arto_addon.capture.sequence import capture_frames
 from arto.arto_addon.relight import many
 from arto.arto_addon.shot import home, paths
 from arto.arto_addon.work import Batch, Failed, Wrote
+from arto.core import exr
 from arto.core.errors import CancelledError, CaptureSetError, SceneError
 from scene_tools import hdri, small_scene, smooth
 
@@ -91,6 +93,22 @@ def test_frames_are_looked_at_before_the_first_is_rendered(scene, monkeypatch):
     assert said.renders == 0 and said.failed == ["frame 3"]
     said = captured(scene, [1, 3], batch=Batch(keep_going=True))
     assert said.renders == 1 and said.failed == ["frame 3"]
+
+
+def test_one_file_of_mattes_for_several_frames_is_refused(scene, tmp_path):
+    """Of the program that wrote it nothing says of which frame it is."""
+    captured(scene, [1, 2])
+    about = {"cryptomatte/a1b2c3d/name": "CryptoObject"}
+    planes = {"CryptoObject00": {"R": np.zeros((18, 24))}}
+    for name in ("one.exr", "mine.0001.exr", "mine.0002.exr"):
+        exr.write_planes(tmp_path / name, planes, about)
+    scene.arto.write_data, scene.arto.cryptomatte = True, str(tmp_path / "one.exr")
+    layer = scene.view_layers[0].name
+    with pytest.raises(SceneError, match="write ####"):
+        work.run(many.relight_many(scene, layer, frames=[1, 2]))
+    assert not list(tmp_path.glob("relit*.exr"))
+    scene.arto.cryptomatte = str(tmp_path / "mine.####.exr")
+    assert len(work.run(many.relight_many(scene, layer, frames=[1, 2]))) == 2
 
 
 def test_room_for_all_frames_is_looked_at(scene, monkeypatch):
