@@ -109,9 +109,12 @@ def parts_at(field: Field, light: PatchLight, x: int, y: int) -> list[Contributi
 
 def _box_of(support: str, parameters: NDArray) -> tuple[float, float, float, float] | None:
     """A rectangle to draw for a support, in patch coordinates."""
-    if support in (BOX.name, BELL.name):
+    if support == BOX.name:
         u0, u1, v0, v1 = (float(p) for p in parameters)
         return u0, u1, v0, v1
+    if support == BELL.name:
+        u, across, v, along = (float(p) for p in parameters)
+        return max(u - across, 0), min(u + across, 1), max(v - along, 0), min(v + along, 1)
     if support == LINEAR.name:
         # the model knows the middle alone, which is drawn as a mark
         u, v = (float(p) for p in parameters)

@@ -21,6 +21,7 @@ from ..measure import box_averages, box_of
 from ..patterns import UU, VV, U, V
 from ..region import Region
 from ..supports import BELL, BOX, LINEAR, WHOLE
+from ..supports.bell import bells_of, moments_of
 from .tile_writer import TileWriter
 
 FACTORS = (2, 4, 8)
@@ -123,7 +124,6 @@ def _merge(
     light = np.zeros((3, grid.half.pixels))
     # sums of R, all channels, times the mean place; and of the boxes' alone, with the squares
     places = np.zeros((2, grid.half.pixels))
-    # a bell has the moments of its box, but for what the patch's rim cuts
     kinds = [code for code, *_ in entries if code in (BOX.code, BELL.code)]
     boxes = np.zeros((5, grid.half.pixels if kinds else 0))
     for code, pixels, coefficient, parameters in entries:
@@ -131,9 +131,13 @@ def _merge(
         for row, channel in zip(light, coefficient, strict=True):
             row += grid.total(pixels, channel)
         if code in kinds:
-            averages = box_averages(parameters.T / np.float64(65535), extent)
-            u, v = averages[U], averages[V]
-            for row, of in zip(boxes, (None, u, v, averages[UU], averages[VV]), strict=True):
+            given = parameters.T / np.float64(65535)
+            if code == BELL.code:
+                u, uu, v, vv = moments_of(given, extent)
+            else:
+                averages = box_averages(given, extent)
+                u, uu, v, vv = (averages[m] for m in (U, UU, V, VV))
+            for row, of in zip(boxes, (None, u, v, uu, vv), strict=True):
                 row += grid.total(pixels, size if of is None else size * of)
         elif code == LINEAR.code:
             u, v = parameters / np.float32(255)
@@ -151,4 +155,5 @@ def _merge(
     if len(narrow):
         _, u, v, uu, vv = boxes[:, narrow] / boxes[0, narrow]
         spread = np.maximum(uu - u * u, 0), np.maximum(vv - v * v, 0)
-        half.add_entries(kinds[0], narrow, light[:, narrow], box_of((u, v), spread, extent).T)
+        shaped = bells_of if kinds[0] == BELL.code else box_of
+        half.add_entries(kinds[0], narrow, light[:, narrow], shaped((u, v), spread, extent).T)
