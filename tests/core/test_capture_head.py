@@ -130,6 +130,11 @@ def without(data: dict[str, Any], *names: str) -> dict[str, Any]:
 
 FILES = {
     "a take of several seeds": WRITTEN,
+    "faint patches": {
+        key: told
+        for name, value in (WRITTEN | {"version": 2}).items()
+        for key, told in [(name, value), *([("radiance", 0.25)] if name == "route" else [])]
+    },
     "no catchers, nothing to be told": without(WRITTEN, "catchers", "take", "pair")
     | {"caution": None},
     "photographed": PHOTOGRAPHED,
@@ -195,6 +200,7 @@ IMPOSSIBLE: dict[str, list[Any]] = {
     "samples": [-1, -0.5, 10**400, True, "64", 1e300],
     "seed": [-1, 2**31, 0.5, False],
     "route": ["", "All", "none"],
+    "radiance": [0, -0.5, 2, 1e-30, True, "faint"],
     "grain": [0, 1, "yes"],
     "adaptive": [0, 1, "yes"],
     "far": [0, 1, "yes"],
