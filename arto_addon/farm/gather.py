@@ -15,9 +15,11 @@ from ...core.capture.capture_set import CaptureSet
 from ...core.capture.head import CaptureHead
 from ...core.capture.kinds import Take
 from ...core.capture.tile_entry import SeedEntry, fitted_name, sums_of
-from ...core.errors import ArtoError, FarmError
+from ...core.errors import ArtoError, FarmError, FieldError
 from ...core.field.field import proxy_folder
 from ...core.field.proxy import FACTORS
+from ...core.field.tile import SUFFIX, checksum_of
+from ...core.field.tile_file import TileFile
 from ...core.files import PART, Lock, moved
 from ...core.fit.fit import fit_into
 from ..capture import room
@@ -107,6 +109,7 @@ def _check_room(scene: bpy.types.Scene, view_layer: str, there: _Frame) -> None:
     near = place
     while not near.exists() and near != near.parent:
         near = near.parent
+    room.free_disk(place)  # which says so where the disk itself is missing
     for captured in there.sets.values():
         if captured.folder.stat().st_dev != near.stat().st_dev:
             needed = estimate(captured.head, not captured.kept).kept
@@ -164,6 +167,8 @@ def _found(job: Job, part: Part, captured: CaptureSet) -> Found | None:
     if captured.head.tiles[part.tile].done:
         return Found(None)
     if told := job.there(part, captured.head.key):
+        if told.fitted:
+            _check_fitted(job.part_folder(part) / Stream.FIELD, told.fitted, part)
         return Found(job.part_folder(part), told.files, told.samples, told.fitted, told.sums)
     files = []
     for i, images in enumerate(plan_of(captured.head)):
@@ -178,6 +183,21 @@ def _found(job: Job, part: Part, captured: CaptureSet) -> Found | None:
     parts = job.folder / "parts"
     samples = job.samples_of(captured.head)
     return Found(parts, tuple(files), samples, sums=sums_of(parts, files))
+
+
+def _check_fitted(field: Path, fitted: Mapping[str, object], part: Part) -> None:
+    """Raise FarmError where a fitted tile, which would replace a good one, is not what was written."""
+    path = field / str(fitted_name(fitted))
+    if path.suffix != SUFFIX or not path.exists():
+        return  # of the version before, or moved by an earlier gathering
+    try:
+        tile = TileFile(path)
+        tile.check()
+        found = checksum_of(tile.index.values())
+        if fitted.get("checksum", found) != found:
+            raise FieldError(f"{path} is another part's")
+    except FieldError as e:
+        raise FarmError(f"{e} (render part {part.number} again)") from e
 
 
 def _joined(job: Job, frame: int, take: Take, parts: dict[Part, Found]) -> Steps[None]:

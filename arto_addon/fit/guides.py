@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.errors import FieldError
 from ...core.field.field import Field
 from ...core.field.writer import replace_layers, write_head
 from ..blender import denoise
@@ -20,9 +21,19 @@ CLEAN_SAMPLES = 1024
 
 
 def guides_of(field: Field) -> dict[str, NDArray]:
-    """The guides that a field carries, by name."""
+    """The guides that a field carries, by name.
+
+    Raises FieldError where one is no number somewhere: a denoiser would spread it.
+    """
     names = ("albedo", "normal")
-    return {n: field.layer(n) for n in names if field.has_layer(n)}
+    found = {n: field.layer(n) for n in names if field.has_layer(n)}
+    for name, pixels in found.items():
+        if not np.isfinite(pixels).all():
+            raise FieldError(
+                f"'{name}' in {field.folder} is infinite or not a number in some pixels: capture "
+                "again, or turn Denoise off"
+            )
+    return found
 
 
 def clean(field: Field) -> bool:
@@ -41,8 +52,10 @@ def cleaned(scene: bpy.types.Scene, folder: Path) -> Steps[None]:
     Nothing is done where the setting `denoise` is off or this Blender cannot denoise.
     """
     field = Field(folder)
+    if not scene.arto.denoise or clean(field) or not denoise.available():
+        return
     guides = guides_of(field)
-    if not scene.arto.denoise or clean(field) or not guides or not denoise.available():
+    if not guides:
         return
     yield Progress(0.99, "denoising the guides")
     for name, pixels in guides.items():

@@ -215,7 +215,7 @@ class Footage:
         if image.source not in {"FILE", "MOVIE"} or getattr(image, "packed_file", None):
             return ""  # `check` looks at the files of a sequence, frame by frame.
         path = Path(bpy.path.abspath(image.filepath, library=image.library))
-        return "" if path.exists() else str(path)
+        return "" if path.is_file() else str(path)  # a pipe would be waited for
 
 
 def _finer(there: tuple[int, int], wanted: tuple[int, int]) -> int:

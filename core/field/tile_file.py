@@ -114,6 +114,17 @@ class TileFile:
         """The names of its arrays, and how many bytes each has."""
         return {name: stored.bytes for name, stored in self.index.items()}
 
+    def check(self) -> None:
+        """Compare all arrays with their checksums.
+
+        Raises
+        ------
+        FieldError
+            If one is not what was written.
+        """
+        for name in self.index:
+            self.load(name)
+
     def load(self, name: str) -> NDArray:
         """One of its arrays.
 

@@ -54,14 +54,33 @@ def test_parts_are_what_one_machine_makes(farm_scene, tmp_path, monkeypatch):
     assert not left, "whole or not at all"
     with pytest.raises(FarmError, match=r"2 of 2 parts are not there \(0, 1\): render them"):
         work.run(gather(job.folder))
-    for number in (1, 0):
-        work.run(parts.render_part(job.folder, number))
+    with monkeypatch.context() as m:
+        # a driver that ran where the job was planned would give 0 here
+        m.setattr(jobs.scripts, "check_drivers", lambda: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            work.run(parts.render_part(job.folder, 1))
+    with monkeypatch.context() as m:
+        # a farm gave the part to two machines, and the other one was first
+        def second(partial: Path, folder: Path) -> None:
+            shutil.copytree(partial, folder)
+            raise OSError("File exists")
+
+        m.setattr(parts, "replace_folder", second)
+        work.run(parts.render_part(job.folder, 1))
+        assert [p.name for p in (job.folder / "parts").iterdir()] == ["part_0001"]
+    work.run(parts.render_part(job.folder, 0))
     rendered = []
     folder = work.run(parts.render_part(job.folder, 0), lambda s: rendered.append(s))
     assert folder == job.folder / "parts" / "part_0000"
     assert [type(s) for s in rendered] == [work.Wrote], "a part that is there is not rendered"
     assert not list(job.folder.rglob("*.exr")), "a part keeps what was fitted"
     (job.folder / "parts" / "part_0001.77.part").mkdir()  # of a process that was killed
+    tile = job.folder / "parts" / "part_0001" / "field" / "tile_0001.arto"
+    good = tile.read_bytes()
+    tile.write_bytes(good[:300] + bytes([good[300] ^ 1]) + good[301:])
+    with pytest.raises(FarmError, match=r"tile_0001.*render part 1 again"):
+        work.run(gather(job.folder))
+    tile.write_bytes(good)
     (found,) = work.run(gather(job.folder))
     assert found == paths.field_folder(farm_scene)
     assert_same(arrays(found), alone)

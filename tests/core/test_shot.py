@@ -106,3 +106,19 @@ def test_names_are_no_difference() -> None:
     assert SHOT.difference(now) is None
     assert SHOT.is_place_of(now)  # a camera by another name is the same one
     assert not SHOT.is_place_of(dataclasses.replace(now, lens=("PERSP", 35.0)))
+
+
+# what a file of anybody may say, of which Python makes errors of many kinds
+ODD = [-1, 1e400, float("nan"), 10**400, 1e308, True, None, "x", [], {}, [[]], [10**400] * 16,
+       ["x"] * 16, "\ud800", 2**63]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SHOT.to_json())
+def test_a_value_that_cannot_be_is_said_or_used(name: str) -> None:
+    for value in ODD:
+        try:
+            found = Shot.from_json(json.loads(json.dumps(SHOT.to_json() | {name: value})))
+        except ShotError:
+            continue
+        told = found.title, found.folders, found.mark, found.difference(SHOT)
+        assert told and isinstance(found.is_place_of(SHOT), bool)
