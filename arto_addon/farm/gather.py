@@ -186,7 +186,7 @@ def _found(job: Job, part: Part, captured: CaptureSet) -> Found | None:
 
 
 def _check_fitted(field: Path, fitted: Mapping[str, object], part: Part) -> None:
-    """Raise FarmError where a fitted tile, which would replace a good one, is not what was written."""
+    """Raise FarmError where a fitted tile, which is to replace another, is not what was written."""
     path = field / str(fitted_name(fitted))
     if path.suffix != SUFFIX or not path.exists():
         return  # of the version before, or moved by an earlier gathering
