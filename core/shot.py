@@ -119,7 +119,7 @@ class Shot:
             value = getattr(out, name)
             if not isinstance(value, kind) or isinstance(value, bool):
                 raise ShotError(f"a shot's {name} cannot be {value!r:.60}")
-        if out.camera_matrix is None or out.lens is None or not 0 <= (out.subframe or 0) <= 1:
+        if None in (given["camera_matrix"], given["lens"]) or not 0 <= (out.subframe or 0) <= 1:
             raise ShotError("a shot's camera, lens or subframe is missing or cannot be")
         numbers = (*out.camera_matrix, *(out.region or ()), out.subframe or 0, out.frame)
         if not all(map(is_finite, numbers)) or not all(
