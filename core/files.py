@@ -31,7 +31,34 @@ from .errors import BusyError, FilesError
 from .marked import OLD
 from .regular import PART, SAFELY, moved, new_file, unique
 
-__all__ = ["OLD", "PART", "Lock", "moved", "replace_folder", "settle", "whole", "write_text"]
+__all__ = [
+    "OLD",
+    "PART",
+    "Lock",
+    "is_writable",
+    "moved",
+    "replace_folder",
+    "settle",
+    "whole",
+    "write_text",
+]
+
+
+def is_writable(folder: Path) -> bool:
+    """Say whether something can be written into a folder, which may still have to be made.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Returns
+    -------
+    bool
+    """
+    there = folder
+    while not os.path.lexists(there) and there != there.parent:
+        there = there.parent
+    return there.is_dir() and os.access(there, os.W_OK | os.X_OK)
 
 
 @contextlib.contextmanager

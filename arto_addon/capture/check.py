@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
-
 import bpy
 
 from ...core.capture.kinds import Keep
 from ...core.errors import BusyError, SceneError
-from ...core.files import Lock
+from ...core.files import Lock, is_writable
 from ...core.fit.choice import check as check_choice
 from ..blender.markers import camera_of
 from ..shot import paths
@@ -39,10 +37,7 @@ def check_place(scene: bpy.types.Scene, view_layer: str) -> None:
     folder = paths.place(scene, view_layer).folder
     if holder := Lock.holder(folder):
         raise BusyError(f"{folder} is in use: {holder}; wait until it is done, or end it there")
-    there = folder
-    while not os.path.lexists(there) and there != there.parent:
-        there = there.parent
-    if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
+    if not is_writable(folder):
         raise SceneError(
             f"nothing can be written into {folder}: see who may write there, or choose another "
             "folder in ARTO's settings"

@@ -16,6 +16,7 @@ from ...core.capture import head as capture_heads
 from ...core.capture.head import CaptureHead
 from ...core.capture.kinds import Take
 from ...core.errors import CaptureSetError, FarmError
+from ...core.files import is_writable
 from ...core.fit.choice import check as check_choice
 from ...core.units import size
 from ..capture import room
@@ -107,10 +108,7 @@ def plan(
 
 def _check_place(folder: Path) -> None:
     """Raise FarmError where nothing can be written into a job's folder."""
-    there = folder
-    while not os.path.lexists(there) and there != there.parent:
-        there = there.parent
-    if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
+    if not is_writable(folder):
         raise FarmError(
             f"nothing can be written into {folder}: see who may write there, or plan into another "
             "folder"

@@ -21,6 +21,7 @@ from bpy.app.handlers import persistent
 from ...core import exr
 from ...core.errors import ArtoError, SceneError
 from ...core.preview import Preview
+from ..blender import handlers
 from ..blender.markers import camera_of
 from ..blender.quitting import not_when_quitting, when_quitting
 from ..job import session
@@ -338,18 +339,14 @@ _HANDLERS = {
 
 def register() -> None:
     if not bpy.app.background:
-        for name, handler in _HANDLERS.items():
-            getattr(bpy.app.handlers, name).append(handler)
+        handlers.add(_HANDLERS)
         when_quitting(_quitting)
 
 
 def unregister() -> None:
     stop()
     not_when_quitting(_quitting)
-    for name, handler in _HANDLERS.items():
-        handlers = getattr(bpy.app.handlers, name)
-        if handler in handlers:
-            handlers.remove(handler)
+    handlers.remove(_HANDLERS)
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
 

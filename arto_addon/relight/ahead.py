@@ -15,6 +15,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import ArtoError, CaptureSetError, SceneError, StrictError
+from ...core.files import is_writable
 from ...core.units import size
 from ..blender import denoise, sequences
 from ..capture.sequence import frame_kept
@@ -292,10 +293,7 @@ def check_picture(
         )
     if path.is_dir():
         raise SceneError(f"{path} is a folder: choose another output")
-    there = path.parent
-    while not os.path.lexists(there) and there != there.parent:
-        there = there.parent
-    if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
+    if not is_writable(path.parent):
         raise SceneError(
             f"nothing can be written into {path.parent}: see who may write there, or choose "
             "another output"

@@ -11,6 +11,8 @@ import uuid
 import bpy
 from bpy.app.handlers import persistent
 
+from ..blender import handlers
+
 # The ID that each scene was given, by `session_uid`, which survives renames and undo.
 _given: dict[int, str] = {}
 
@@ -72,10 +74,8 @@ _HANDLERS = {"undo_post": _after_undo, "redo_post": _after_undo, "load_post": _a
 
 
 def register() -> None:
-    for name, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(handler)
+    handlers.add(_HANDLERS)
 
 
 def unregister() -> None:
-    for name, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).remove(handler)
+    handlers.remove(_HANDLERS)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.app.handlers import persistent
 
+from ..blender import handlers
 from . import fingerprint as prints
 from .fingerprint import Fingerprint
 
@@ -119,15 +120,11 @@ _HANDLERS = {
 def register() -> None:
     if bpy.app.background:
         return  # Without a window nothing is drawn, and `latest` makes the fingerprint itself.
-    for name, handler in _HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(handler)
+    handlers.add(_HANDLERS)
 
 
 def unregister() -> None:
-    for name, handler in _HANDLERS.items():
-        handlers = getattr(bpy.app.handlers, name)
-        if handler in handlers:
-            handlers.remove(handler)
+    handlers.remove(_HANDLERS)
     if bpy.app.timers.is_registered(_look):
         bpy.app.timers.unregister(_look)
     for kept in (_latest, _asked, _stale):

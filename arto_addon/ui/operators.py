@@ -55,6 +55,17 @@ class Quick(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class Removes(Quick):
+    """An operator that removes files of a shot: the artist is asked first."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return free(cls)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return context.window_manager.invoke_confirm(self, event)
+
+
 class ARTO_OT_build_hemicube(Quick):
     """Build the hemicube of light patches around the scene, to look at. It is not rendered; \
 capturing uses its geometry"""
@@ -285,18 +296,11 @@ def remove_capture(folder: Path, place: paths.Place) -> None:
         raise SceneError(f"{folder} cannot be removed ({e})") from e
 
 
-class ARTO_OT_discard_unfinished(Quick):
+class ARTO_OT_discard_unfinished(Removes):
     """Remove the captures of this shot that were stopped, with their finished tiles"""
 
     bl_idname = "arto.discard_unfinished"
     bl_label = "Discard Unfinished"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return free(cls)
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        return context.window_manager.invoke_confirm(self, event)
 
     def work(self, context: bpy.types.Context) -> str:
         place = own_place(context.scene)

@@ -24,7 +24,7 @@ from ..world import controls
 from ..world.check import world_of
 from . import state
 from .long_work import LongWork
-from .operators import Quick, can_capture, can_relight, free, own_place, remove_capture
+from .operators import Quick, Removes, can_capture, can_relight, free, own_place, remove_capture
 
 
 class ARTO_OT_shoot(LongWork):
@@ -76,18 +76,11 @@ class ARTO_OT_set_back(Quick):
         return f"set back to {then.title}"
 
 
-class ARTO_OT_delete_capture(Quick):
+class ARTO_OT_delete_capture(Removes):
     """Delete the rendered images of this capture; what relighting reads stays"""
 
     bl_idname = "arto.delete_capture"
     bl_label = "Delete Capture, Keep Relighting"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return free(cls)
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        return context.window_manager.invoke_confirm(self, event)
 
     def work(self, context: bpy.types.Context) -> str:
         place = own_place(context.scene)

@@ -256,20 +256,26 @@ def test_nothing_is_left(scene) -> None:
     assert {i.name for i in bpy.data.images} == before
 
 
+def whole_map(made: maps.Maps, scene) -> np.ndarray:
+    """The map of the scene's world at full size, once it is there."""
+    key = kept.shows(scene, scene.world)[0]
+    made.ask(scene, scene.view_layers[0].name, scene.world, key, True)
+    until = time.monotonic() + 240
+    while (found := made.get(key, True)) is None:
+        assert not made.trouble, made.trouble
+        assert time.monotonic() < until
+        time.sleep(0.05)
+    return found
+
+
 def test_maps_are_those_of_a_relight(scene) -> None:
     """What the other Blender makes is what this one makes, whole."""
     made = maps.Maps()
     try:
-        key = kept.shows(scene, scene.world)[0]
-        made.ask(scene, scene.view_layers[0].name, scene.world, key, True)
-        until = time.monotonic() + 240
-        while made.get(key, True) is None:
-            assert not made.trouble, made.trouble
-            assert time.monotonic() < until
-            time.sleep(0.05)
+        found = whole_map(made, scene)
         with without_dials(scene, scene.view_layers[0].name, scene.world) as (plain, _, _):
             expected = kept.environment(scene, 128, None, plain).image
-        np.testing.assert_array_equal(made.get(key, True), expected)
+        np.testing.assert_array_equal(found, expected)
     finally:
         made.close()
 
@@ -308,15 +314,8 @@ def test_a_linked_world(tmp_path) -> None:
     assert scene.world.library
     made, worlds = maps.Maps(), len(bpy.data.worlds)
     try:
-        key = kept.shows(scene, scene.world)[0]
-        made.ask(scene, scene.view_layers[0].name, scene.world, key, True)
-        until = time.monotonic() + 240
-        while made.get(key, True) is None:
-            assert not made.trouble, made.trouble
-            assert time.monotonic() < until
-            time.sleep(0.05)
-        expected = kept.environment(scene, 128).image
-        np.testing.assert_array_equal(made.get(key, True), expected)
+        found = whole_map(made, scene)
+        np.testing.assert_array_equal(found, kept.environment(scene, 128).image)
     finally:
         made.close()
     assert len(bpy.data.worlds) == worlds
