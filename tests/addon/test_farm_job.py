@@ -8,7 +8,7 @@ import shutil
 import bpy
 import pytest
 from arto.arto_addon import work
-from arto.arto_addon.capture import room
+from arto.arto_addon.capture import room, sequence
 from arto.arto_addon.capture.capture import estimate
 from arto.arto_addon.capture.sequence import capture_frames
 from arto.arto_addon.farm import head as job_heads
@@ -158,3 +158,38 @@ def test_frames_by_number_are_those_of_a_sequence(farm_scene, tmp_path):
     for frames, expected in (([1], anew), (None, as_built)):
         job = planned_job(farm_scene, tmp_path / "job", frames)
         assert job.set_of(1, "").hemicube.centre == expected
+
+
+def test_frames_whose_parts_are_there_can_be_gathered(farm_scene, tmp_path):
+    farm_scene.arto.adaptive = farm_scene.arto.far = False
+    farm_scene.arto.samples = 2
+    job = planned_job(farm_scene, tmp_path / "job", frames=[1, 2], tiles=1)
+    work.run(parts.render_part(job.folder, 0))
+    with pytest.raises(FarmError, match=r"1 of 1 parts are not there \(1\)"):
+        work.run(gather(job.folder))
+    failed = []
+
+    def say(step):
+        failed.extend([step.of] if isinstance(step, work.Failed) else [])
+
+    (folder,) = work.run(gather(job.folder, work.Batch(keep_going=True)), say)
+    assert failed == ["frame 2"] and Field(folder).has_layer("alpha")
+    work.run(parts.render_part(job.folder, 1))
+    assert len(work.run(gather(job.folder))) == 2
+
+
+def test_a_plan_looks_at_all_frames_before_it_removes_anything(farm_scene, tmp_path, monkeypatch):
+    farm_scene.arto.adaptive = farm_scene.arto.far = False
+    job = planned_job(farm_scene, tmp_path / "job", frames=[1], tiles=1)
+    before = {path: path.read_bytes() for path in job.folder.rglob("*") if path.is_file()}
+    real = sequence.check_scene
+
+    def check(scene, layer=None):
+        real(scene, layer)
+        if scene.frame_current == 2:
+            raise SceneError("the cloth was not baked")
+
+    monkeypatch.setattr(sequence, "check_scene", check)
+    with pytest.raises(SceneError, match="cloth"):
+        planned_job(farm_scene, tmp_path / "job", frames=[1, 2], tiles=1)
+    assert {path: path.read_bytes() for path in job.folder.rglob("*") if path.is_file()} == before

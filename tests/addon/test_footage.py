@@ -197,9 +197,15 @@ def as_clip(scene, path):
     behind.source, behind.clip = "MOVIE_CLIP", bpy.data.movieclips.load(str(path))
 
 
-@pytest.mark.parametrize("where", [behind_camera, as_setting, as_clip])
-@pytest.mark.parametrize("what", [gone, flipped, cut, smaller])
-@pytest.mark.parametrize("kind", ["exr", "png", "jpg"])
+# all that can be wrong of each kind of file, and two of it wherever footage may be
+WRONG = [
+    *((as_setting, what, kind) for what in (gone, cut, smaller) for kind in ("exr", "png", "jpg")),
+    *((as_setting, flipped, kind) for kind in ("exr", "png")),  # a JPEG has no checksum
+    *((where, what, "exr") for where in (behind_camera, as_clip) for what in (gone, smaller)),
+]
+
+
+@pytest.mark.parametrize(("where", "what", "kind"), WRONG)
 def test_a_sequence_of_footage_is_looked_at_frame_by_frame(tmp_path, where, what, kind):
     """A picture that is missing, damaged or of another size is no picture of another frame."""
     scene = small_scene(tmp_path)
@@ -209,8 +215,6 @@ def test_a_sequence_of_footage_is_looked_at_frame_by_frame(tmp_path, where, what
         scene.frame_set(frame)
         assert footage(scene).check(scene) == ""
         assert footage(scene).shown(scene) == f"filmed_{frame:04d}.{kind}"
-    if kind == "jpg" and what is flipped:
-        return  # a JPEG has no checksum
     what(tmp_path / f"filmed_0003.{kind}")
     scene.frame_set(2)
     assert footage(scene).check(scene) == ""
