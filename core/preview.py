@@ -31,6 +31,8 @@ from .hemicube import Hemicube
 from .light.light import PatchLight
 from .relight import relights
 
+# Of the light that gains add or take away, what is rounding.
+ROUNDING = np.float32(1e-5)
 # Seconds for a pixel and a patch, until a picture was timed.
 _GUESS = 2e-9
 
@@ -96,6 +98,23 @@ class Preview:
         """
         return self.level(factor)[0].shape
 
+    def through(self, factor: int) -> NDArray[np.float32] | None:
+        """Give how much of the world behind is seen, by channel.
+
+        Parameters
+        ----------
+        factor : int
+            How many times smaller.
+
+        Returns
+        -------
+        (h, w, 3) float32, or None
+            None where it is 1 - alpha: of a picture without colours behind clear things, and of a
+            shot with shadow catchers.
+        """
+        fields = self.level(factor)
+        return fields[0].through() if len(fields) == 1 else None
+
     def factor_for(self, seconds: float) -> int:
         """Find the largest picture that is expected to take no longer than a time.
 
@@ -146,8 +165,9 @@ class Preview:
         for field in fields:
             cut = len(fields) > 1 and field is not fields[-1]
             picture = relights(field, [light], 0.0, cut=cut)[0]
-            picture[..., :3] += own_light(field, own, gains)
-            np.maximum(picture, 0, out=picture)
+            lamps = own_light(field, own, gains)
+            # lamps may take light away; a fit that falls below 0 may not
+            picture[..., :3] = np.maximum(picture[..., :3] + lamps, np.minimum(lamps, 0))
             found.append(picture)
         out = found[0]
         if len(found) > 1:
@@ -177,12 +197,15 @@ def own_light(
     Returns
     -------
     (H, W, 3) float32
-        Scene-linear radiance.
+        Scene-linear radiance. Below 0 where lamps or emission of negative strength take light away.
     """
     out = field.layer("own")
+    scale: NDArray | float = 0.0
     for name in field.own_layers:
         gain = (gains or {}).get(name.removeprefix("own_"), 1.0)
         if gain != 1.0:
-            out = out + np.float32(gain - 1.0) * field.layer(name)
+            part = np.float32(gain - 1.0) * field.layer(name)
+            out, scale = out + part, scale + np.abs(part)
     # a group that is switched off leaves 0 or, by rounding, a little less
-    return np.float32(own) * np.maximum(out, 0)
+    rounding = (out < 0) & (out > -ROUNDING * scale)
+    return np.float32(own) * np.where(rounding, 0, out)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from .field.field import Field
 from .field.model import Model
+from .field.through import opaque
 from .field.tile import Tile
 from .light.light import PatchLight
 from .lights import ROOM, Lights
@@ -329,7 +330,9 @@ def _rest_light(tile: Tile, tables: NDArray[np.float32], where: slice) -> NDArra
     return tile.rest(where) * total[:, :3]
 
 
-def over(plate: NDArray, background: NDArray) -> NDArray[np.float32]:
+def over(
+    plate: NDArray, background: NDArray, through: NDArray | None = None
+) -> NDArray[np.float32]:
     """Lay a plate over an opaque background.
 
     Parameters
@@ -338,13 +341,19 @@ def over(plate: NDArray, background: NDArray) -> NDArray[np.float32]:
         Scene-linear, premultiplied.
     background : (H, W, 3) float
         Scene-linear.
+    through : (H, W, 3) float, optional
+        How much of the background is seen, by channel; by default 1 - alpha.
 
     Returns
     -------
     (H, W, 4) float32
-        Opaque.
+        Opaque, but for the holes that `through` leaves.
     """
     out = plate.astype(np.float32, copy=True)
-    out[..., :3] += (1 - plate[..., 3:]) * background
-    out[..., 3] = 1
+    if through is None:
+        out[..., :3] += (1 - plate[..., 3:]) * background
+        out[..., 3] = 1
+    else:
+        out[..., :3] += through * background
+        out[..., 3] = opaque(plate[..., 3], through)
     return out

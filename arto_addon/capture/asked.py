@@ -33,6 +33,7 @@ from ..stage.stage import Stage, picture_region, stage
 from ..stage.takes import THINGS, WHOLE, only_things, take
 from ..work import Steps
 from . import planes
+from .behind import portals_seen, see_behind
 from .patterns import patterns_of
 from .planned import Given, Planned, planned
 
@@ -96,6 +97,8 @@ def asked(
         prepare(on, layers=len(patterns) + grain)
         # the other takes need light alone, and each pass less saves memory
         on.scene.view_layers[0].use_pass_position = name == WHOLE
+        if name == WHOLE:
+            see_behind(on)
         if name == THINGS:
             only_things(on.scene.view_layers[0])
         shot = shot_of(scene, view_layer, region)
@@ -108,6 +111,7 @@ def asked(
             blender=bpy.app.version_string,
             colour_space=working_space(),
             film_transparent=scene.render.film_transparent,
+            portals=portals_seen(on),
             changed=dict(on.changed),
             catchers=tuple(sorted(set(seen.catchers))) if seen.catchers else None,
             take=name if seen.catchers else None,
@@ -129,6 +133,8 @@ def asked(
         if settings.keep != Keep.ALWAYS:
             everything += values(settings, Decides.CAPTURE_FIT).values()
         key = hashlib.sha256(json.dumps(everything, sort_keys=True).encode()).hexdigest()[:16]
+        # it follows from what the key holds already
+        head = replace(head, behind=True if name == WHOLE else None)
         catchers = bool(seen.catchers)
         yield Asked(
             scene, view_layer, on, hemicube, region, grain, shot, found, key, head, catchers,

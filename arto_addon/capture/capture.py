@@ -249,7 +249,8 @@ def set_tile(
     # the scene's own lamps are in every render; the first render separates them by group
     sampled = head.route == Route.SAMPLED
     own = not sampled and images == plan_of(head)[0]
-    return planes.lit(on, head.hemicube, head.patterns, images, sampled, own, head.radiance or 1.0)
+    faint, portals = head.radiance or 1.0, bool(head.portals)
+    return planes.lit(on, head.hemicube, head.patterns, images, sampled, own, faint, portals)
 
 
 def render_tile(on: Stage, head: CaptureHead, number: int, folder: Path) -> Steps[list[str]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -18,16 +18,13 @@ from ...core.patterns import BASE, SHARP, PatternSet, pattern_set
 from ..blender.markers import camera_of
 from ..blender.nodes import Input, Nodes, made_of_nodes, new_material
 from ..stage.stage import Stage, free_mark
+from .behind import beyond_clip
+from .shells import GAP, LID, PATTERN, Made, lid, threshold
 
 COLLECTION = "ARTO Hemicube"
 # Distance of the patches that an artist looks at, in radii of the scene.
 VISIBLE = 2.0
-PATTERN = "arto_pattern"
 FAR = 1000.0
-# The patterns of a patch stand behind each other, each farther out by this share. The gap is so
-# small that a point of the patch keeps its direction, and so wide that float32 at 1,000 radii does
-# not lose it.
-GAP = 1e-4
 # What the patches of a capture emit where a pattern is 1. Cycles adds the emission that a mirror or
 # glass shows to the albedo that guides the denoiser, and there it must not be seen. A power of two
 # changes no bit of what the light is.
@@ -57,8 +54,6 @@ def wanted(scene: bpy.types.Scene, centre: Iterable[float], radius: float) -> He
     )
 
 
-# Notes a new data-block, and returns it.
-Made = Callable[[bpy.types.ID], bpy.types.ID]
 # Grains along a patch's side: far finer than the part of a patch that a pixel reflects.
 GRAINS = 2.0**14
 
@@ -108,8 +103,12 @@ def _radiance(nodes: Nodes, name: str, patterns: PatternSet) -> list[Input]:
     ]
 
 
-def _shader(nodes: Nodes, shown: list[Input], radiance: float) -> bpy.types.NodeSocket:
+def _shader(
+    nodes: Nodes, shown: list[Input], radiance: float, hidden: Input = 0.0
+) -> bpy.types.NodeSocket:
     """Emission, plus what lies behind; shown: see `_radiance`; radiance: what 1 of it is.
+
+    hidden: 1 where nothing lies behind.
 
     The background lies behind the last pattern. There Cycles adds the scene's sun lamps to
     scattered rays. An opaque patch would hide the suns' mirror images.
@@ -120,8 +119,10 @@ def _shader(nodes: Nodes, shown: list[Input], radiance: float) -> bpy.types.Node
     else:
         colour = nodes.add("ShaderNodeCombineColor", *shown).outputs[0]
         light = nodes.add("ShaderNodeEmission", colour, radiance).outputs[0]
-    behind = nodes.add("ShaderNodeBsdfTransparent").outputs[0]
-    return nodes.add("ShaderNodeAddShader", light, behind).outputs[0]
+    behind = nodes.add("ShaderNodeBsdfTransparent")
+    if hidden:
+        nodes.tree.links.new(nodes.math("SUBTRACT", 1.0, hidden), behind.inputs[0])
+    return nodes.add("ShaderNodeAddShader", light, behind.outputs[0]).outputs[0]
 
 
 def pattern_material(
@@ -170,8 +171,10 @@ def overriding_material(
             value = channels[c if len(channels) > 1 else 0]
             total[c] = nodes.math("MULTIPLY_ADD", mine, value, total[c])
     plane = nodes.math("GREATER_THAN", number.outputs["Fac"], 0.5)
+    hidden = nodes.math("COMPARE", number.outputs["Fac"], LID, 0.5)
     output = tree.get_output_node("CYCLES") or tree.nodes.new("ShaderNodeOutputMaterial")
-    for socket, pattern in (("Surface", _shader(nodes, total, radiance)), ("Volume", None)):
+    surface = _shader(nodes, total, radiance, hidden)
+    for socket, pattern in (("Surface", surface), ("Volume", None)):
         links = output.inputs[socket].links
         if not links and pattern is None:
             continue
@@ -199,7 +202,6 @@ def _plane(
     uv.data.foreach_set("uv", [0, 0, 1, 0, 1, 1, 0, 1])
     mesh.materials.append(material)
     plane = made(bpy.data.objects.new(name, mesh))
-    plane.visible_camera = False
     # the scene's own sun must reach the scene through the patches
     plane.visible_shadow = False
     plane.display_type = "WIRE"
@@ -207,14 +209,16 @@ def _plane(
     return plane
 
 
-def _seen_by(plane: bpy.types.Object, paths: str) -> None:
+def _seen_by(plane: bpy.types.Object, paths: str, portals: bool) -> None:
     """Hide a plane from the light paths that are not to see it; see `patterns.PATHS`.
 
     A path sees either all planes of the base or all of the sharp ones: what it left last is either
-    a diffuse surface or a volume, or it is one that reflects or refracts.
+    a diffuse surface or a volume, or it is one that reflects or refracts. portals: whether a path
+    that left the camera sees planes too, the sharp ones.
     """
     plane.visible_diffuse = plane.visible_volume_scatter = paths != SHARP
     plane.visible_glossy = plane.visible_transmission = paths != BASE
+    plane.visible_camera = portals and paths != BASE
 
 
 def build(
@@ -226,11 +230,12 @@ def build(
     mark: str = "",
     sampled: bool = False,
     radiance: float = 1.0,
+    portals: bool = False,
 ) -> None:
     """Fill `collection` with a plane for each (patch, pattern name) of `images`.
 
     mark: part of the names of light groups (`stage.free_mark`); without a mark the planes get no
-    light group. made: called with every new data-block, which it returns.
+    light group. made: called with every new data-block, which it returns. portals: see `lit`.
     """
     images = list(images)
     used = list(dict.fromkeys(name for _, name in images))
@@ -242,38 +247,9 @@ def build(
         distance = hemicube.size * (1 + GAP * used.index(pattern))
         plane = _plane(name, centre + distance * hemicube.corners(k), materials[pattern], made)
         plane.lightgroup = group
-        if pattern != GRAIN:
-            _seen_by(plane, patterns.paths(pattern))
+        _seen_by(plane, patterns.paths(pattern) if pattern != GRAIN else "", portals)
         plane[PATTERN] = float(used.index(pattern) + 1)
         collection.objects.link(plane)
-
-
-# The number of no pattern, as property `PATTERN`.
-NONE = 1000.0
-
-
-def _threshold(collection: bpy.types.Collection, hemicube: Hemicube, made: Made) -> None:
-    """A clear shell before the patterns, at which Cycles tosses its coin.
-
-    Russian roulette ends a path, or makes it count for more, at the first surface that it meets
-    after a bounce, and after that surface's emission. Were this the white pattern, it would see
-    other weights than the patterns behind it, and their ratio would be off by that.
-    """
-    material = made(new_material("ARTO Threshold"))
-    material.node_tree.nodes.clear()
-    nodes = Nodes(material.node_tree)
-    clear = nodes.add("ShaderNodeBsdfTransparent").outputs[0]
-    nodes.add("ShaderNodeOutputMaterial", clear)
-    centre, distance = np.array(hemicube.centre), hemicube.size * (1 - GAP)
-    corners = [centre + distance * hemicube.corners(k) for k in range(len(hemicube))]
-    mesh = made(bpy.data.meshes.new("ARTO Threshold"))
-    quads = [tuple(range(4 * k, 4 * k + 4)) for k in range(len(corners))]
-    mesh.from_pydata(np.concatenate(corners).tolist(), [], quads)
-    mesh.materials.append(material)
-    shell = made(bpy.data.objects.new("ARTO Threshold", mesh))
-    shell.visible_camera = shell.visible_shadow = False
-    shell[PATTERN] = NONE
-    collection.objects.link(shell)
 
 
 @contextmanager
@@ -285,12 +261,14 @@ def lit(
     sampled: bool = False,
     own: bool = False,
     radiance: float = 1.0,
+    portals: bool = False,
 ) -> Iterator[None]:
     """Put the planes of some images around the stage, with light groups, for as long as it is open.
 
     sampled: whether Cycles also casts shadow rays at the patches, as it does at a world; it can do
     so for at most `MOST_SAMPLED` images. own: whether the artist's light groups are written too.
-    radiance: what the patches emit where a pattern is 1, see `FAINT`.
+    radiance: what the patches emit where a pattern is 1, see `FAINT`. portals: whether rays of the
+    camera see the patches where Ray Portals have turned them.
     """
     made: list[bpy.types.ID] = []
     images = list(images)
@@ -303,6 +281,8 @@ def lit(
 
     layer = on.scene.view_layers[0]
     override = layer.material_override
+    if portals:
+        hemicube = beyond_clip(on.scene, hemicube)
     try:
         if override:
             names = list(dict.fromkeys(name for _, name in images))
@@ -310,11 +290,14 @@ def lit(
             layer.material_override = note(shown)
         collection = note(bpy.data.collections.new("ARTO Capture"))
         on.scene.collection.children.link(collection)
-        build(collection, hemicube, patterns, images, note, free_mark(), sampled, radiance)
+        mark = free_mark()
+        build(collection, hemicube, patterns, images, note, mark, sampled, radiance, portals)
         planes = list(collection.objects)
         if len(patterns) > 1:
             # One pattern alone has no ratios to keep, and the coin after it costs it no noise.
-            _threshold(collection, hemicube, note)
+            threshold(collection, hemicube, note)
+        if portals:
+            lid(collection, hemicube, note, len(patterns) + 1)
         # the artist's groups come first: their lamps are sampled, and of the groups of sampled
         # lights Cycles can only tell the first apart
         for name in on.own_groups if own else ():

@@ -15,6 +15,7 @@ from ...core.errors import ArtoError, FieldError
 from ...core.light.environment import Environment
 from ...core.light.light import PatchLight
 from ...core.preview import Preview
+from ...core.relight import over
 
 # Seconds that a picture may take while the artist changes the world.
 MOVING = 0.06
@@ -135,8 +136,10 @@ def show(preview: Preview, wish: Wish) -> Drawn:
         view = view[: picture.shape[0], : picture.shape[1]]
         h, w = view.shape[:2]
         there = view.any(axis=-1, keepdims=True)
-        picture[:h, :w, :3] += (1 - picture[:h, :w, 3:]) * environment.at(view) * there
-        picture[:h, :w, 3:] = np.where(there, 1, picture[:h, :w, 3:])
+        through = preview.through(factor)
+        through = None if through is None else through[:h, :w]
+        behind = over(picture[:h, :w], environment.at(view), through)
+        picture[:h, :w] = np.where(there, behind, picture[:h, :w])
     if not np.isfinite(picture).all():
         raise FieldError(
             "the picture is infinite or not a number in some pixels: look what is so bright in the "

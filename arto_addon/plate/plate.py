@@ -118,12 +118,14 @@ def world_file(path: Path) -> Path:
 
 
 def data_file(path: Path) -> Path:
-    """The path of the data, beside a plate: albedo, normals, depth, positions, Cryptomattes."""
+    """The path of the data, beside a plate: albedo, normals, Cryptomattes and more, see `DATA`."""
     return path.with_name(f"{path.stem}_data.exr")
 
 
 # By the layers of the data file: the letters of the layer's channels.
-DATA = {"albedo": "RGB", "normal": "XYZ", "depth": "Z", "position": "XYZ"}
+DATA = {"albedo": "RGB", "normal": "XYZ", "depth": "Z", "position": "XYZ", "through": "RGB"}
+# How much of what lies behind is seen, by channel; where alpha does not tell it.
+THROUGH = "through"
 # The part of the data file with what the artist's own render has.
 MATTES = "cryptomatte"
 # The attribute in the header of the data file that names the missing layers.
@@ -144,10 +146,13 @@ def write_data(
     Returns the names of the layers that the field does not have. Raises ExrError.
     """
     parts: dict[str, dict[str, NDArray]] = {}
-    missing = [name for name in DATA if not field.has_layer(name)]
+    missing = [name for name in DATA if name != THROUGH and not field.has_layer(name)]
     for name, letters in DATA.items():
-        if field.has_layer(name):
-            pixels = field.layer(name).reshape(*field.shape, -1)
+        layer = field.through() if name == THROUGH else None
+        if name != THROUGH and field.has_layer(name):
+            layer = field.layer(name)
+        if layer is not None:
+            pixels = layer.reshape(*field.shape, -1)
             if not np.isfinite(pixels).all():
                 raise FieldError(
                     f"'{name}' in {field.folder} is infinite or not a number in some pixels, so "

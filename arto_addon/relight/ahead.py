@@ -29,7 +29,7 @@ from ..work import Progress, Steps
 from ..world.check import check_images, check_world, differs_by_rays
 from ..world.images import files_at, image_nodes
 from . import layers
-from .shown import Shown
+from .shown import Shown, check_film
 
 # Said in a warning, and in the header of the plate.
 NO_DENOISER = "no: this Blender was built without Open Image Denoise"
@@ -242,6 +242,7 @@ def check_frame(shown: Shown, own_world: bool, strict: bool) -> None:
     for take in shown.takes:
         take.field.has_layer("alpha")  # raises where a tile is missing or damaged
     plate.window_of(scene).check(shown.field.shape)
+    check_film(scene, shown.field)
     shown.footage_warning()
     shown.mattes()
     if own_world:

@@ -160,12 +160,17 @@ def of_plate(shot: Shown, ready: Ready) -> Steps[dict[str, NDArray[np.float32]]]
             found[name] = scale * gain * field.layer(name)
             left = left - field.layer(name)
         # lamps in no light group: what the groups leave over, but for what is rounding
-        found[OWN] = scale * np.where(left > 1e-5 * own, left, 0)
+        found[OWN] = scale * np.where(np.abs(left) > 1e-5 * np.abs(own), left, 0)
     if scene.arto.denoise and denoise.available():
         for name, picture in found.items():
             yield Progress(0.93, f"denoising the layer {name}")
-            found[name] = shown.denoised(picture)
+            found[name] = shown.denoised(picture, signed=name in own_names(scene))
     return found
+
+
+def own_names(scene: bpy.types.Scene) -> set[str]:
+    """The names of the layers of the scene's own lamps, which may take light away."""
+    return {OWN, *gains_of(scene)}
 
 
 def write(
@@ -186,7 +191,8 @@ def write(
     names = [channel_name(scene, name) for name in layers]
     each = settings.layers_files == "EACH"
     files = layer_files(path, names) if each else {}
-    parts = share_out(list(layers.values()), beauty[..., :3])
+    signed = [i for i, name in enumerate(layers) if name in own_names(scene)]
+    parts = share_out(list(layers.values()), beauty[..., :3], signed)
     kind = np.float32
     if settings.layers_half:
         if max(float(np.max(p, initial=0)) for p in [*parts, beauty]) <= exr.HALF:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from ...core.catcher import catch_seen, of_ground
 from ...core.errors import FieldError
+from ...core.field.field import Field
+from ...core.field.through import opaque
 from ...core.light.environment import Environment
 from ...core.light.lamps import Split
 from ...core.light.light import PatchLight
@@ -29,7 +31,7 @@ from ..world.check import check_world, differs_by_rays
 from ..world.lamp_render import brightness, lamp_light, lamp_samples
 from ..world.own import own_of
 from . import ahead, files, light_key
-from .shown import Laps, Light, Ready, Shown
+from .shown import Laps, Light, Ready, Shown, check_film
 
 # From this share of the light on, the lamps' picture and the field's are denoised as a single sum.
 # The lamps alone, with darkness beside their light, come out of the denoiser worse
@@ -97,6 +99,7 @@ def make_ready(shown: Shown, lit: Light) -> Steps[Ready]:
     changed, by_rays = shown.changed(), differs_by_rays(world)
     # raise before the long work what would be raised after it
     plate.window_of(scene).check(field.shape)
+    check_film(scene, field)
     ahead.check_picture(shown, lit.path, lit.world)
     shown.mattes()
     shown.filmed()
@@ -134,9 +137,10 @@ def finish(
     scene, lit = shown.scene, ready.lit
     settings, path = scene.arto, lit.path
     lap = ready.laps.lap
-    summed = []
+    summed, least, signed = [], 0.0, False
     for take, picture, parts in zip(shown.takes, pictures, ready.rendered, strict=True):
-        summed.append((yield from _with_own(take, ready, picture, parts)))
+        parts, least, signed = yield from _with_own(take, ready, picture, parts)
+        summed.append(parts)
     by, held = shown.takes, 0.0
     if len(by) > 1:
         # The first two takes are divided by each other. The visible ground of each is denoised in
@@ -152,7 +156,10 @@ def finish(
     if settings.denoise:
         yield Progress(0.7, "denoising")
         if denoise.available():
-            summed = [[t.denoised(*parts)] for t, parts in zip(by, summed, strict=True)]
+            signed = signed and len(by) == 1
+            summed = [
+                [t.denoised(*parts, signed=signed)] for t, parts in zip(by, summed, strict=True)
+            ]
             denoised = "Open Image Denoise"
         else:
             # three places say this: this message, the file's header and the last message
@@ -162,9 +169,10 @@ def finish(
     for picture, parts in zip(pictures, summed, strict=True):
         picture[..., :3] = sum(parts)
     picture, caught = pictures[-1], None
-    # A plane fitted through a sun beside darkness falls below 0. A picture has no negative light.
-    # The pictures of the ground keep their negative values, since their noise is on both sides.
-    np.maximum(picture, 0, out=picture)
+    # A plane fitted through a sun beside darkness falls below 0, which no light does but that of
+    # negative lamps. The pictures of the ground keep their negative values, since their noise is on
+    # both sides.
+    picture[..., :3] = np.maximum(picture[..., :3], least)
     if len(pictures) > 1:
         left, bare, apart = pictures
         caught = catch_seen(left[..., :3], bare[..., :3], apart, bare[..., 3], held)
@@ -205,8 +213,11 @@ def check_finite(picture: NDArray | float, name: str) -> None:
 
 def _with_own(
     shown: Shown, ready: Ready, picture: NDArray[np.float32], parts: list[NDArray[np.float32]]
-) -> Steps[list[NDArray[np.float32]]]:
-    """Add the scene's own lamps to a take's picture -> the pictures that sum to the take's plate.
+) -> Steps[tuple[list[NDArray[np.float32]], NDArray[np.float32] | float, bool]]:
+    """Add the scene's own lamps to a take's picture.
+
+    -> (the pictures that sum to the take's plate; the least that the plate can be, a number or (H,
+    W, 3); whether light is taken away, by lamps or by the world)
 
     picture: what the take's field shows, (H, W, 4); parts: pictures of the world's lamps, none or
     one. Raises FieldError where a value is not finite.
@@ -218,9 +229,15 @@ def _with_own(
         yield from _hold(shown, ready.whole, picture, parts)
     own = own_of(shown.scene, shown.field)
     check_finite(own, f"the scene's own lamps in the field {shown.field.folder}")
+    dark = bool((own < -LEAST_SHARE * np.abs(picture[..., :3])).any())
     picture[..., :3] += own
     parts = [*parts, picture[..., :3]]
-    return [sum(parts, np.zeros_like(picture[..., :3]))] if ready.together else parts
+    least = -np.inf if ready.below else np.minimum(own, 0) if dark else 0.0
+    signed = dark or bool(ready.below)
+    if ready.together or signed:
+        # what is below 0 in one of them may be light in their sum
+        parts = [sum(parts, np.zeros_like(picture[..., :3]))]
+    return parts, least, signed
 
 
 def _lamps(shown: Shown, found: Split) -> Steps[tuple[list[NDArray[np.float32]], str, bool]]:
@@ -267,25 +284,44 @@ def _hold(
 
 def _behind(shown: Shown, lit: Light, picture: NDArray[np.float32], has_lamps: bool) -> None:
     """Add the world as the camera sees it behind everything."""
-    scene, layer = shown.scene, shown.layer
-    captured = shown.field.region
-    if holds_out(scene, layer):
-        if len(shown.takes) > 1:
+    scene, layer, field = shown.scene, shown.layer, shown.field
+    captured = field.region
+    through = field.through()
+    holes = holds_out(scene, layer)
+    # captures of before did not look through the holes
+    unknown = holes and through is None and not field.about.behind
+    if len(shown.takes) > 1:
+        if holes:
             # the world behind shows through the shadows, but not in the holes
-            solid = without_holes(scene, captured, layer, lit.world)
+            solid = _solid(field, through)
+            if unknown:
+                solid = without_holes(scene, captured, layer, lit.world)
             there = background(scene, captured, layer, has_lamps, lit.world)
             seen = np.clip(solid - picture[..., 3], 0, 1)
             picture[..., :3] += seen[..., None] * there
             picture[..., 3] = solid
             return
+        through = None  # the shadows are in the alpha of the plate
+    elif unknown:
         behind = background_with_holes(scene, captured, layer, lit.world)
         picture[..., :3] += behind[..., :3]
         picture[..., 3] = behind[..., 3]
         return
     # outside a render region Cycles leaves a picture empty
     inside = picture[captured.slices]
-    rows, columns = np.nonzero(inside[..., 3] < OPAQUE)
+    through = None if through is None else through[captured.slices]
+    rows, columns = np.nonzero(inside[..., 3] < OPAQUE if through is None else through.any(axis=-1))
     if len(rows):
         seen = Region.around(rows + captured.y, columns + captured.x)
         there = background(scene, seen, layer, has_lamps, lit.world)[captured.slices]
-        picture[captured.slices] = over(inside, there)
+        picture[captured.slices] = over(inside, there, through)
+
+
+def _solid(field: Field, through: NDArray[np.float32] | None) -> NDArray[np.float32]:
+    """The alpha of a field's picture with the world behind it, 0 outside its region -> (H, W)."""
+    out = np.zeros(field.shape, np.float32)
+    region = field.region.slices
+    out[region] = 1
+    if through is not None:
+        out[region] = opaque(field.layer("alpha")[region], through[region])
+    return out

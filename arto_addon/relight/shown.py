@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...core.capture.kinds import Route
 from ...core.catcher import held_out
 from ...core.cryptomatte import Mattes
-from ...core.errors import FieldError
+from ...core.errors import FieldError, SceneError
 from ...core.field.field import Field
 from ...core.light.environment import Environment
 from ...core.light.lamps import Split, split
@@ -60,6 +60,21 @@ class Light:
     path: Path
     look: str = ""
     world: bpy.types.World | None = None
+
+
+def check_film(scene: bpy.types.Scene, field: Field) -> None:
+    """Raise SceneError where a field has, or lacks, what Ray Portals show of the world.
+
+    Cycles shows it before an opaque film, and it is in the light of such a capture. Over a
+    transparent film the portal is clear.
+    """
+    seen, clear = field.about.portals, scene.render.film_transparent
+    if seen is not None and seen == clear:
+        was, back = ("an opaque", "off") if seen else ("a transparent", "on")
+        raise SceneError(
+            f"the shot has Ray Portals and was captured for {was} film, on which it depends what "
+            f"they show: turn Transparent {back} (Render properties, Film), or capture again"
+        )
 
 
 class Shown:
@@ -179,8 +194,15 @@ class Shown:
     def guides(self) -> dict[str, NDArray]:
         return guides.guides_of(self.field)
 
-    def denoised(self, *parts: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Denoise pictures of what the field shows, (H, W, 3), one by one -> their sum."""
+    def denoised(self, *parts: NDArray[np.float32], signed: bool = False) -> NDArray[np.float32]:
+        """Denoise pictures of what the field shows, (H, W, 3), one by one -> their sum.
+
+        signed: whether light is taken away, so that there are values below 0. The denoiser knows
+        none, and gets them by themselves.
+        """
+        if signed and any((part < 0).any() for part in parts):
+            taken = self.denoised(*(np.maximum(-part, 0) for part in parts))
+            return self.denoised(*(np.maximum(part, 0) for part in parts)) - taken
         clean = guides.clean(self.field)
         # of a shot with catchers these are differences of two takes, which may be below 0
         lamps_apart = len(parts) == 2 and len(self.takes) == 1

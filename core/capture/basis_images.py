@@ -220,7 +220,10 @@ class BasisImages:
             for n in first.guides
             if all(n in a.guides for a in layers)
         }
-        return Around(mean([a.own for a in layers]), mean([a.alpha for a in layers]), guides)
+        there = [a.behind for a in layers if a.behind is not None]
+        behind = mean(there) if len(there) == len(layers) else None
+        own, alpha = mean([a.own for a in layers]), mean([a.alpha for a in layers])
+        return Around(own, alpha, guides, behind)
 
     def read(self) -> TileData:
         """Read the whole tile into memory.
@@ -244,8 +247,9 @@ class BasisImages:
         there = [g for g in grains if g is not None]
         grain = np.stack(there) if there else None
         return TileData(
-            self.region, basis, found.own, found.alpha, found.guides, grain, self.together
-        )
+            self.region, basis, found.own, found.alpha, found.guides, grain, self.together,
+            found.behind,
+        )  # fmt: skip
 
 
 def _compare(folder: Path, names: list[str], sums: Mapping[str, int]) -> None:

@@ -35,7 +35,7 @@ from . import head as heads
 from .basis_images import BasisImages
 from .head import CaptureHead
 from .kinds import Route
-from .names import COMBINED, group_name
+from .names import BEHIND, BEHIND_LIGHT, COMBINED, group_name
 from .tile_data import TileData
 from .tile_entry import TileEntry, sums_of
 
@@ -176,6 +176,7 @@ def write(
     basis: NDArray,
     own: NDArray | None = None,
     alpha: NDArray | None = None,
+    behind: NDArray | None = None,
     **about: Any,
 ) -> None:
     """Write basis images, for example photographs, as a capture set of one tile.
@@ -193,6 +194,8 @@ def write(
         The light that is always there; by default none.
     alpha : (H, W) float, optional
         By default 1.
+    behind : (H, W, 3) float, optional
+        How much of the world behind is seen, by channel; by default 1 - alpha.
     **about : object
         What else `capture.json` says, by its names there.
 
@@ -212,6 +215,8 @@ def write(
     if alpha is not None:
         combined[..., 3] = alpha
     layers = {COMBINED: combined}
+    if behind is not None:
+        layers[BEHIND[0]] = (behind * BEHIND_LIGHT).astype(np.float32)
     for k in range(len(hemicube)):
         for p, name in enumerate(patterns.patterns):
             layers[f"Combined_{group_name(k, name)}"] = basis[k, p].astype(np.float32)

@@ -80,6 +80,9 @@ class CaptureHead:
     caution : what the check of the light said.
     seconds : that rendering took, so far.
     pair : of a take beside the first, the key of the first.
+    behind : whether the images have a layer of what the camera sees of the world behind.
+    portals : whether what Ray Portals show of the world is in the light of the patches; None where
+        the scene has none.
     others : what the file says beside that; it is written again.
     """
 
@@ -99,6 +102,7 @@ class CaptureHead:
     blender: str | None = None
     colour_space: str | None = None
     film_transparent: bool | None = None
+    portals: bool | None = None
     changed: Mapping[str, list[Any]] | None = None
     catchers: tuple[str, ...] | None = None
     take: Take | None = None
@@ -114,6 +118,7 @@ class CaptureHead:
     caution: Caution | None = None
     seconds: float | None = None
     pair: str | None = None
+    behind: bool | None = None
     others: Mapping[str, Any] = field(default_factory=dict)
 
     @staticmethod
@@ -174,6 +179,7 @@ class CaptureHead:
             blender=said.some_text("blender"),
             colour_space=said.some_text("colour_space"),
             film_transparent=said.kind("film_transparent", bool),
+            portals=said.kind("portals", bool),
             changed=changed,
             catchers=said.names("catchers", MOST_TILES),
             take=said.one_of("take", Take),
@@ -189,6 +195,7 @@ class CaptureHead:
             caution=Caution.read(said.inside(caution, "caution", "caution.")) if caution else None,
             seconds=said.real("seconds", 0, LONGEST),
             pair=said.some_text("pair"),
+            behind=said.kind("behind", bool),
             others=said.others([*_WRITTEN, *(f.name for f in fields(CaptureHead))]),
         )
         head._check(said)

@@ -28,6 +28,12 @@ GUIDES = {
     "depth": "Depth",
     "position": "Position",
 }
+# The layer of what the camera sees of the world behind all things: an image of a white world that
+# only the camera sees, straight or through what is clear. Blender's versions name it differently.
+BEHIND = ("Environment", "Env")
+# The radiance of that white world. It is so small that no other layer shows it, and a power of two,
+# so that dividing by it is exact.
+BEHIND_LIGHT = 2.0**-40
 # Guides of the first ray through a pixel. A mean of two places would be neither of them.
 OF_ONE_RAY = ("depth", "position")
 # The light groups of the scene's own lamps, as their artist named them.
@@ -59,6 +65,26 @@ def is_combined(layer: str) -> bool:
     [True, True, False]
     """
     return layer == COMBINED or layer.endswith(f".{COMBINED}")
+
+
+def is_behind(layer: str) -> bool:
+    """Whether a layer of a render is that of the world behind, see `BEHIND`.
+
+    Parameters
+    ----------
+    layer
+        Its name.
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> [is_behind(n) for n in ("ViewLayer.Environment", "Env", "Combined_Env")]
+    [True, True, False]
+    """
+    return layer.rpartition(".")[2] in BEHIND
 
 
 def combined(layers: Mapping[str, Pixels]) -> Pixels:

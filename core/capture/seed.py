@@ -21,7 +21,17 @@ from .. import exr
 from ..errors import CaptureSetError
 from ..hemicube import Hemicube
 from ..patterns import PatternSet
-from .names import COMBINED, GRAIN, GROUP, GUIDES, OWN_GROUP, is_combined, own_layer
+from .names import (
+    BEHIND_LIGHT,
+    COMBINED,
+    GRAIN,
+    GROUP,
+    GUIDES,
+    OWN_GROUP,
+    is_behind,
+    is_combined,
+    own_layer,
+)
 from .tile_data import Around
 
 # What remains of Combined without the light groups, as a share of them, where there is no other
@@ -90,6 +100,7 @@ class Seed:
         self.files = [opened.enter_context(exr.Layers(of.folder / name)) for name in names]
         self.there: dict[tuple[int, str], tuple[int, str]] = {}
         self.others: dict[str, tuple[int, str]] = {}
+        self.behind: tuple[int, str] | None = None
         patterns = [*of.patterns.patterns, *([GRAIN] if of.grain else [])]
         wanted = {(k, name) for k in range(len(of.hemicube)) for name in patterns}
         for number, file in enumerate(self.files):
@@ -107,6 +118,8 @@ class Seed:
                 elif is_combined(layer):
                     self.others.setdefault(COMBINED, (number, layer))
                     combined = True
+                elif is_behind(layer):
+                    self.behind = self.behind or (number, layer)
                 elif match := OWN_GROUP.search(layer):
                     self.others.setdefault(own_layer(match[1]), (number, layer))
                 else:
@@ -241,7 +254,8 @@ class Seed:
         """
         number, layer = self.others[COMBINED]
         combined = self.files[number].read(layer)
-        self._check(number, layer, combined, (*self.of.shape, 4))
+        # lamps and emission may be below 0
+        self._check(number, layer, combined, (*self.of.shape, 4), signed=True)
         there = lit * self.of.radiance
         own = np.asarray(combined[..., :3] - there)
         own[np.abs(own) < ROUNDING * there] = 0
@@ -250,10 +264,26 @@ class Seed:
             number, layer = self.others[guide]
             pixels = self.files[number].read(layer)
             guides[guide] = pixels[..., 0] if pixels.shape[-1] == 1 else pixels
-        return Around(np.maximum(own, 0).astype(np.float32), combined[..., 3], guides)
+        behind = None
+        if self.behind:
+            number, layer = self.behind
+            behind = self.files[number].read(layer)
+            self._check(number, layer, behind, (*self.of.shape, 3), signed=True)
+            behind = (behind / BEHIND_LIGHT).astype(np.float32)
+        return Around(own.astype(np.float32), combined[..., 3], guides, behind)
 
-    def _check(self, number: int, layer: str, pixels: NDArray, shape: tuple[int, ...]) -> None:
-        """Raise CaptureSetError for an image that would falsify the light."""
+    def _check(
+        self,
+        number: int,
+        layer: str,
+        pixels: NDArray,
+        shape: tuple[int, ...],
+        signed: bool = False,
+    ) -> None:
+        """Raise CaptureSetError for an image that would falsify the light.
+
+        signed: whether pixels may be below 0.
+        """
         say = f"{self.files[number].path}, '{layer}'"
         if pixels.shape != shape:
             raise CaptureSetError(
@@ -268,6 +298,8 @@ class Seed:
             )
         # the scene's own lamps, which only Combined has, may be as bright as they like
         most = BRIGHTEST * self.of.radiance if shape[-1] == 3 else np.inf
+        if signed:
+            pixels = np.abs(pixels)
         # a comparison of the bits finds negative numbers, infinities and NaN in one pass
         bits = pixels.view(np.int32) if pixels.flags.c_contiguous else None
         if bits is None or not _within(bits.reshape(-1), most):
@@ -275,10 +307,12 @@ class Seed:
             if not bad.any():
                 return
             y, x = np.argwhere(bad)[0]
+            what = "infinite or not a number"
+            if not signed:
+                what = "negative, infinite, not a number or too bright to be light of a patch"
             raise CaptureSetError(
-                f"{say} has {int(bad.sum())} pixels that are negative, infinite, not a number or "
-                f"too bright to be light of a patch, the first at ({x}, {y}): find the material "
-                "there, and capture again"
+                f"{say} has {int(bad.sum())} pixels that are {what}, the first at ({x}, {y}): find "
+                "the material there, and capture again"
             )
 
 

@@ -34,11 +34,14 @@ class Around:
     guides : dict of str to (h, w) or (h, w, 3) float32
         Those of albedo, normal, position and depth that were captured, and the `own_layer` of each
         light group of the scene's own lamps.
+    behind : (h, w, 3) float32, optional
+        How much of the world behind all things the camera sees, by channel.
     """
 
     own: NDArray[np.float32]
     alpha: NDArray[np.float32]
     guides: dict[str, NDArray[np.float32]]
+    behind: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True)
@@ -51,7 +54,7 @@ class TileData:
         Its place in the picture.
     basis : (K, P, h, w, 3) float32
         The basis images, scene-linear radiance.
-    own, alpha, guides
+    own, alpha, guides, behind
         See `Around`.
     grain : (K, h, w) float32, optional
         The difference of two random halves of the light, summed over channels, see `names.GRAIN`.
@@ -66,6 +69,7 @@ class TileData:
     guides: dict[str, NDArray[np.float32]]
     grain: NDArray[np.float32] | None = None
     together: bool = True
+    behind: NDArray[np.float32] | None = None
 
     def images(self, k: int) -> NDArray[np.float32]:
         """Give the basis images of a patch.
@@ -137,4 +141,4 @@ class TileData:
         """
         for k, images in enumerate(self.basis):
             look(k, images)
-        return Around(self.own, self.alpha, self.guides)
+        return Around(self.own, self.alpha, self.guides, self.behind)

@@ -41,7 +41,7 @@ class About:
         Of each pixel of the capture; 0 where it was rendered without noise.
     far : bool
         Whether the light comes from far away, as a world's does.
-    key, fingerprint, route, catchers, take, pair
+    key, fingerprint, route, catchers, take, pair, behind, portals
         As in the head of the capture set, see `core.capture.head`.
     guides : str
         "clean" where albedo and normals were denoised.
@@ -69,6 +69,8 @@ class About:
     catchers: tuple[str, ...] | None = None
     take: Take | None = None
     pair: str | None = None
+    behind: bool | None = None
+    portals: bool | None = None
     guides: str | None = None
     proxy: int | None = None
     fit_seconds: float | None = None
@@ -116,6 +118,8 @@ class About:
             catchers=said.names("catchers", MOST_TILES),
             take=said.one_of("take", Take),
             pair=said.some_text("pair"),
+            behind=said.kind("behind", bool),
+            portals=said.kind("portals", bool),
             guides=said.some_text("guides"),
             proxy=said.count("proxy", 1, 64),
             fit_seconds=said.real("fit_seconds", 0, LONGEST),

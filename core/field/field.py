@@ -22,7 +22,7 @@ from .about import About
 from .head import HEADER
 from .tile import OF_A_MODEL, OTHERS, Tile
 
-LAYERS = ("own", "alpha", "albedo", "normal", "depth", "position")
+LAYERS = ("own", "alpha", "through", "albedo", "normal", "depth", "position")
 
 
 def proxy_folder(folder: Path, factor: int) -> Path:
@@ -214,4 +214,29 @@ class Field:
             out[tile.region.slices] = part
         if out is None:
             raise FieldError(f"{self.folder} holds no tiles: fit again")
+        return out
+
+    @property
+    def tinted(self) -> bool:
+        """Whether a tile tells more of what is seen behind than alpha does, see `through`."""
+        return any(tile.has_layer("through") for tile in self.tiles)
+
+    def through(self) -> NDArray[np.float32] | None:
+        """How much of the world behind is seen in the whole picture, 0 outside the tiles.
+
+        Returns
+        -------
+        (H, W, 3) float32, or None
+            By channel; None where it is 1 - alpha in all of them.
+
+        Raises
+        ------
+        FieldError
+            If a tile is missing or damaged.
+        """
+        if not self.tinted:
+            return None
+        out = np.zeros((*self.shape, 3), np.float32)
+        for tile in self.tiles:
+            out[tile.region.slices] = tile.through()
         return out

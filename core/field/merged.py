@@ -147,6 +147,7 @@ class MergedTile:
         self.blocks: list[slice] = []
         self._layers: dict[str, NDArray[np.float32]] = {}
         self._tiles = tiles
+        self._tinted = any(t.has_layer("through") for t in tiles)
         self._names = set(tiles[0].sizes).intersection(*(t.sizes for t in tiles))
         begin = 0
         for group in groups:
@@ -243,8 +244,31 @@ class MergedTile:
             self.close()
         return self._layers[name][part]
 
+    def through(
+        self, part: tuple[slice, slice] = (slice(None), slice(None))
+    ) -> NDArray[np.float32]:
+        """As `Tile.through`, and kept.
+
+        Parameters
+        ----------
+        part : tuple of slice
+
+        Returns
+        -------
+        (h, w, 3) float32
+
+        Raises
+        ------
+        FieldError
+            If a tile is missing or damaged.
+        """
+        if "through" not in self._layers:
+            self._layers["through"] = np.concatenate([t.through() for t in self._tiles])
+            self.close()
+        return self._layers["through"][part]
+
     def has_layer(self, name: str) -> bool:
-        """Whether every tile has a layer.
+        """Whether every tile has a layer; of `through`, whether any has.
 
         Parameters
         ----------
@@ -254,7 +278,7 @@ class MergedTile:
         -------
         bool
         """
-        return name in self._names
+        return self._tinted if name == "through" else name in self._names
 
     def own_layers(self) -> list[str]:
         """Layers of light groups of the scene's own lamps that every tile has.

@@ -22,6 +22,7 @@ from ..errors import FieldError
 from ..region import Region
 from ..supports import BY_CODE, NOTHING, REST
 from .model import Entries, Model
+from .through import through_of
 from .tile_file import Stored, TileFile
 from .tile_folder import TileFolder
 
@@ -184,6 +185,29 @@ class Tile:
         if out.shape[:2] != (self.region.height, self.region.width):
             raise FieldError(f"{self.path} is damaged, '{name}' has the wrong size: fit again")
         return out[part].astype(np.float32)
+
+    def through(
+        self, part: tuple[slice, slice] = (slice(None), slice(None))
+    ) -> NDArray[np.float32]:
+        """How much of the world behind is seen, by channel, see `through`.
+
+        Parameters
+        ----------
+        part : tuple of slice
+            Rows and columns that are read.
+
+        Returns
+        -------
+        (h, w, 3) float32
+
+        Raises
+        ------
+        FieldError
+            If the file is missing or damaged.
+        """
+        if self.has_layer("through"):
+            return self.layer("through", part)
+        return through_of(self.layer("alpha", part))
 
     @property
     def sizes(self) -> dict[str, int]:

@@ -32,6 +32,7 @@ from ..capture.capture_set import CaptureSet
 from ..capture.moments import Moments
 from ..capture.tile_data import TileData
 from ..field.about import About
+from ..field.through import tells_more
 from ..field.tile_writer import TileWriter
 from ..field.writer import FieldWriter, write_tile
 from ..hemicube import Hemicube
@@ -97,6 +98,8 @@ def fit_tile(
     around = data.around(look)
     yield READING
     layers = {"own": around.own, "alpha": around.alpha, **around.guides}
+    if around.behind is not None and tells_more(around.behind, around.alpha):
+        layers["through"] = around.behind
     writer = TileWriter(data.region, layers)
     known = evidence(sizes, shape, hemicube.solid_angles, samples, data.grain_of)
     brightest = None
@@ -219,6 +222,8 @@ def about_of(captured: CaptureSet, choice: str, separate: bool) -> About:
         catchers=head.catchers,
         take=head.take,
         pair=head.pair,
+        behind=head.behind,
+        portals=head.portals,
     )
 
 

@@ -15,7 +15,7 @@ Examples
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,11 +120,14 @@ def part_of(environment: Environment, share: NDArray) -> Environment:
     return Environment((environment.image * share[..., None]).astype(np.float32), environment.turn)
 
 
-def share_out(layers: Sequence[NDArray], whole: NDArray) -> list[NDArray[np.float32]]:
+def share_out(
+    layers: Sequence[NDArray], whole: NDArray, signed: Collection[int] = ()
+) -> list[NDArray[np.float32]]:
     """Change layers so that they sum to a picture and none is below 0.
 
     The difference is shared in proportion to the layers, channel by channel. Light that no layer
-    has is given to all in equal parts.
+    has is given to all in equal parts. A layer that takes light away stays as it is, and the others
+    sum to the picture without it.
 
     Parameters
     ----------
@@ -132,11 +135,21 @@ def share_out(layers: Sequence[NDArray], whole: NDArray) -> list[NDArray[np.floa
         Scene-linear.
     whole : (H, W, 3) float
         The picture.
+    signed : collection of int
+        The numbers of the layers that may take light away.
 
     Returns
     -------
     list of (H, W, 3) float32
     """
+    apart = {i for i in signed if (layers[i] < 0).any()}
+    if apart and len(apart) < len(layers):
+        left = whole - np.sum([layers[i] for i in apart], axis=0)
+        there = share_out([part for i, part in enumerate(layers) if i not in apart], left)
+        others = iter(there)
+        return [
+            part.astype(np.float32) if i in apart else next(others) for i, part in enumerate(layers)
+        ]
     parts = [np.maximum(layer, 0).astype(np.float64) for layer in layers]
     total = np.sum(parts, axis=0)
     there = total > 0

@@ -8,12 +8,14 @@ import bpy
 import numpy as np
 import pytest
 from arto.arto_addon import work
+from arto.arto_addon.blender.nodes import Nodes, new_material
 from arto.arto_addon.blender.output import float_exr, write_to
 from arto.arto_addon.relight import relight
 from arto.arto_addon.stage.stage import picture_region, stage
 from arto.arto_addon.world.background import background
 from arto.core import exr
-from scene_tools import hdri, holding_out, small_scene, smooth
+from arto.core.errors import SceneError
+from scene_tools import add_mesh, hdri, holding_out, small_scene, smooth
 from shot_tools import run_all
 
 
@@ -65,6 +67,47 @@ def test_plate_over_its_world(tmp_path, how):
     noise = np.abs(one - two)[..., :3].mean()
     assert np.abs(picture - one)[..., :3].mean() < 2 * noise + 0.01
     assert abs(picture[..., :3].mean() / one[..., :3].mean() - 1) < 0.01
+
+
+def _clear(nodes: Nodes):
+    return nodes.add("ShaderNodeBsdfTransparent", (0.9, 0.4, 0.1, 1)).outputs[0]
+
+
+def _portal(nodes: Nodes):
+    """Half of a portal that looks aside, and half of what is tinted."""
+    portal = nodes.tree.nodes.new("ShaderNodeBsdfRayPortal")
+    aside = nodes.add("ShaderNodeCombineXYZ", 1.0, 0.3, 0.4).outputs[0]
+    nodes.tree.links.new(aside, portal.inputs["Direction"])
+    return nodes.add("ShaderNodeMixShader", 0.5, portal.outputs[0], _clear(nodes)).outputs[0]
+
+
+def _dark(nodes: Nodes):
+    clear = nodes.add("ShaderNodeBsdfTransparent", (1, 1, 1, 1)).outputs[0]
+    less = nodes.add("ShaderNodeEmission", (1, 0.5, 0, 1), -0.4).outputs[0]
+    return nodes.add("ShaderNodeAddShader", clear, less).outputs[0]
+
+
+def test_what_is_seen_through_panes(tmp_path):
+    """Tinted, turned, and less light than none: beside Cycles' own picture, pane by pane."""
+    scene = sky(tmp_path)
+    for i, make in enumerate((_clear, _portal, _dark)):
+        glass = new_material("pane")
+        glass.node_tree.nodes.clear()
+        nodes = Nodes(glass.node_tree)
+        nodes.add("ShaderNodeOutputMaterial", make(nodes))
+        left, right = 1.3 * i - 2, 1.3 * i - 0.7
+        corners = [(left, -3, 0.2), (right, -3, 0.2), (right, -3, 6), (left, -3, 6)]
+        add_mesh(scene, "pane", corners, [(0, 1, 2, 3)], glass)
+    picture = run_all(scene)
+    one, two = (own_picture(scene, 256, tmp_path, seed) for seed in (1, 2))
+    assert (picture[..., 3] == 1).all()
+    for columns in (slice(0, 8), slice(8, 16), slice(16, 24)):
+        mine, truth, other = (p[:, columns, :3] for p in (picture, one, two))
+        assert np.abs(mine - truth).mean() < 2 * np.abs(truth - other).mean() + 0.01
+        assert abs(mine.mean() / truth.mean() - 1) < 0.01
+    scene.render.film_transparent = True
+    with pytest.raises(SceneError, match="Ray Portals and was captured for an opaque film"):
+        work.run(relight.relight(scene))
 
 
 @pytest.mark.parametrize("what", ["motion", "fisheye", "aspect", "exposure", "shift"])

@@ -54,6 +54,7 @@ WRITTEN: dict[str, Any] = {
     "blender": "5.2.3 LTS",
     "colour_space": "Linear Rec.709",
     "film_transparent": False,
+    "portals": True,
     "changed": {
         "cycles.samples": [4096, 64],
         "cycles.use_denoising": [True, False],
@@ -89,6 +90,7 @@ WRITTEN: dict[str, Any] = {
     },
     "frame": 1,
     "fingerprint": {"=Object 'Matt'": "0c9f", "Material 'Floor'": "4dd1"},
+    "behind": True,
     "caution": {"text": "it is dark", "ratio": 0.5, "worst": 0.25, "share": 0.125, "dark": False},
     "tiles": [
         {"region": [0, 0, 24, 6], "files": [], "done": True, "fitted": ENTRY},
@@ -207,6 +209,7 @@ IMPOSSIBLE: dict[str, list[Any]] = {
     "blender": ["x" * 40_000, 5.2],
     "colour_space": ["x" * 40_000, 709],
     "film_transparent": [0, 1, "yes"],
+    "portals": [0, 1, "yes"],
     "changed": [{"cycles.samples": 64}, {"cycles.samples": [1, 2, 3]}],
     "catchers": [[3], "Floor", [["Floor"]]],
     "take": ["Ground", "sky", 0],
@@ -222,6 +225,7 @@ IMPOSSIBLE: dict[str, list[Any]] = {
     "caution": [{"text": "dark"}, WRITTEN["caution"] | {"share": 1.5}],
     "seconds": [-1.0, 1e300, "long", 10**400],
     "pair": ["x" * 40_000, 3],
+    "behind": [0, 1, "yes"],
 }
 OF_NO_KIND = [[[[]]], 7.25, {"a": {"b": []}}]
 NAMED = [f.name for f in fields(CaptureHead) if f.name != "others"]
