@@ -18,7 +18,7 @@ from ...core.capture.capture_set import CaptureSet
 from ...core.capture.head import CaptureHead
 from ...core.capture.tile_entry import sums_of
 from ...core.errors import FarmError
-from ...core.files import replace_folder
+from ...core.files import replace_folder, whole
 from ...core.fit.fit import fit_into
 from ..blender.output import write_to
 from ..capture import room
@@ -127,7 +127,8 @@ def save_part(job_folder: Path, number: int) -> Steps[Path]:
 def _save_alone(scene: bpy.types.Scene, path: Path) -> None:
     """Save a file with this scene and all that the scene needs, at the scene's frame."""
     scene.frame_start = scene.frame_end = scene.frame_current
-    bpy.data.libraries.write(str(path), {scene}, path_remap="RELATIVE", compress=True)
+    with whole(path) as partial:
+        bpy.data.libraries.write(str(partial), {scene}, path_remap="RELATIVE", compress=True)
 
 
 @contextmanager

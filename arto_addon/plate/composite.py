@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import SceneError
+from ...core.files import whole
 from ..blender.compositing import OUTPUT, composited, compositor, own_compositor
 from ..blender.pictures import put
 from ..work import Progress, Steps
@@ -44,10 +45,16 @@ def save_composite(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
     path = composite_file(scene)
     yield Progress(0.1, "compositing")
     picture = _composited(scene)
+    if bad := int((~np.isfinite(picture)).any(axis=-1).sum()):
+        raise SceneError(
+            f"the composite is infinite or not a number in {bad} pixels, so it was not written: "
+            "look which node or which picture is so there"
+        )
     image = put(COMPOSITE, picture)
     try:
-        image.save_render(str(path), scene=scene)
-    except RuntimeError as e:
+        with whole(path) as partial:
+            image.save_render(str(partial), scene=scene)
+    except (OSError, RuntimeError) as e:
         raise SceneError(f"{path} cannot be written ({e})") from e
     finally:
         bpy.data.images.remove(image)

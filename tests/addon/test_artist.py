@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from arto.arto_addon.blender.compositing import compositor
 from arto.arto_addon.capture import planes
 from arto.arto_addon.fit import fit
 from arto.arto_addon.plate import compare
-from arto.arto_addon.plate.composite import save_composite
+from arto.arto_addon.plate.composite import composite_file, save_composite
 from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.plate.present import present, use
 from arto.arto_addon.plate.verify import verify_file, verify_plate
@@ -187,7 +189,12 @@ def test_composite_without_a_render(ready) -> None:
     ready.arto.use_in_compositor = "RENDER"
     use(ready)
     scenes = len(bpy.data.scenes)
+    others = Path(ready.arto.folder) / "comp.nk"
+    others.write_text("mine")
+    composite_file(ready).symlink_to(others)  # a link in the way is replaced, not followed
     path = work.run(save_composite(ready, LAYER))
+    assert others.read_text() == "mine" and not path.is_symlink()
+    assert not list(path.parent.glob("*.part"))
     assert path.suffix == ".exr" and len(bpy.data.scenes) == scenes
     saved = next(iter(exr.read(path).values()))
     np.testing.assert_allclose(saved[..., :3], _plate(ready)[..., :3], rtol=1e-3, atol=1e-4)
