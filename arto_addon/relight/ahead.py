@@ -7,7 +7,6 @@ all pictures that were asked for.
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +17,7 @@ from ...core.errors import ArtoError, CaptureSetError, SceneError, StrictError
 from ...core.files import is_writable
 from ...core.units import size
 from ..blender import denoise, sequences
+from ..capture import room
 from ..capture.sequence import frame_kept
 from ..plate import mattes, plate
 from ..plate.footage import footage
@@ -359,7 +359,7 @@ def _check_room(needed: Mapping[Path, int]) -> None:
         old = path.stat().st_size if path.is_file() else 0
         by_folder[there] = by_folder.get(there, 0) + max(more - old, 0)
     for folder, more in by_folder.items():
-        free = shutil.disk_usage(folder).free
+        free = room.free_disk(folder)
         if free < more:
             raise SceneError(
                 f"the pictures need about {size(more)} of disk, and {folder} has {size(free)} "
