@@ -87,6 +87,11 @@ def test_lobes_are_refused_where_light_comes_by_shadow_rays_alone(tmp_path, monk
     monkeypatch.setattr(planned, "light_route", by_shadow_rays)
     with pytest.raises(SceneError, match="choose the patterns '1, u, v'"):
         captured(scene)
+    # left to the capture, they are those; and what is sampled must not be faint
+    scene.arto.patterns, scene.arto.samples = "auto", 2
+    head = captured(scene).head
+    assert head.patterns.name == "linear" and head.route == Route.SAMPLED
+    assert head.radiance is None
 
 
 def test_faint_patches_are_the_same_light_and_none_in_the_guides(tmp_path, monkeypatch) -> None:
