@@ -18,8 +18,8 @@ from ..plate import mattes
 from ..plate.footage import TIMING, footage
 from ..settings.setting import Decides
 from ..settings.table import values
-from ..shot import paths, status, walk
-from ..shot.fingerprint import of_blocks
+from ..shot import paths, status, walk, watch
+from ..shot.fingerprint import key_of, of_blocks
 from ..shot.shot import layer_of, shot_of
 from ..world.kept import shows
 from ..world.own import gains_of
@@ -40,12 +40,14 @@ def light_key(
     world: bpy.types.World,
     view_layer: str | None = None,
     field: Field | None = None,
+    shows_now: str | None = None,
 ) -> str:
     """A key of sixteen letters, the same whenever all that decides a plate is the same.
 
-    That is the light and the scene's own lamps, the camera, the frame and the size, the captured
-    field, the settings of a relight, the footage, the groups of the light and the Cryptomattes.
-    view_layer: default: `layer_of`; field: default: the shot's field on disk.
+    That is the light and the scene's own lamps, the things in the scene, the camera, the frame and
+    the size, the captured field, the settings of a relight, the footage, the groups of the light
+    and the Cryptomattes. view_layer: default: `layer_of`; field: default: the shot's field on disk;
+    shows_now: the digest of the things (`Shown.scene_key`, the default).
     """
     layer = view_layer or layer_of(scene)
     field = field or _field_of(scene, layer)
@@ -56,6 +58,7 @@ def light_key(
     of += [str(value) for value in values(settings, Decides.PLATE).values()]
     of += [sorted((n, round(g, 5)) for n, g in gains_of(scene).items())]
     of += [_shot(scene, layer), _field(field), _footage(scene), _groups(scene)]
+    of.append(_things(scene, layer, field) if shows_now is None else shows_now)
     rendered = mattes.file_of(scene, field) if field else None
     of.append(_content(rendered) if rendered else None)
     return hashlib.sha256(repr(of).encode()).hexdigest()[:16]
@@ -75,6 +78,15 @@ def _shot(scene: bpy.types.Scene, view_layer: str) -> object:
     except ArtoError as e:  # an empty render region
         return str(e)
     return [getattr(shot, name) for name in _OF_SHOT]
+
+
+def _things(scene: bpy.types.Scene, view_layer: str, field: Field | None) -> str:
+    """A digest of the things in the scene, or those of the capture before the window has looked."""
+    then = field.about.fingerprint if field else None
+    if not then:
+        return ""
+    found = watch.latest(scene, view_layer, dict(then), bpy.app.background)
+    return key_of(dict(then) if found is None else found)
 
 
 def _field(field: Field | None) -> str | None:

@@ -186,7 +186,7 @@ def finish(
         check_finite(picture, f"the world '{ready.world.name}' behind the scene")
     check_finite(picture, "the sum of the picture's parts")
     about = {"scene": scene.name, "world": ready.world.name, "denoised": denoised}
-    key = light_key.light_key(scene, ready.world, shown.layer, shown.field)
+    key = light_key.light_key(scene, ready.world, shown.layer, shown.field, shown.scene_key())
     about[light_key.HEADER.removeprefix("arto.")] = key
     yield from files.write(shown, ready, files.Made(picture, things, caught), about)
     lap("write")

@@ -25,9 +25,9 @@ from ..blender import denoise
 from ..fit import guides
 from ..plate import mattes
 from ..plate.footage import footage
-from ..shot import paths
+from ..shot import paths, watch
+from ..shot.fingerprint import Fingerprint, changes, key_of
 from ..shot.shot import check_same_shot
-from ..shot.status import changed_since
 from ..stage import takes
 from ..world.background import holds_out
 
@@ -99,7 +99,7 @@ class Shown:
                         f"--command arto adopt --from '{other}'; else capture this one"
                     )
         self.field = Field(folder)
-        self._changed: dict[tuple[int, float], list[str]] = {}
+        self._looked: dict[tuple[int, float], Fingerprint | None] = {}
         self._split: tuple[NDArray[np.float32], Split] | None = None
         self._filmed: tuple[tuple[int, float], tuple[str, NDArray[np.float32]]] | None = None
         self._mattes: tuple[Path | None, Mattes | None] | None = None
@@ -134,12 +134,22 @@ class Shown:
 
     def changed(self) -> list[str]:
         """What has changed in the scene since the capture, at the scene's frame, in words."""
+        then, found = self.field.about.fingerprint, self._fingerprint()
+        return changes(dict(then), found) if then is not None and found is not None else []
+
+    def scene_key(self) -> str:
+        """A digest of what the scene shows at its frame; "" for a field without a fingerprint."""
+        found = self._fingerprint()
+        return key_of(found) if found is not None else ""
+
+    def _fingerprint(self) -> Fingerprint | None:
+        """The scene's fingerprint at its frame, made once; None where the field has none."""
         frame = self.scene.frame_current, self.scene.frame_subframe
-        if frame not in self._changed:
+        if frame not in self._looked:
             then = self.field.about.fingerprint
-            found = changed_since(self.scene, self.layer, then, now=True)
-            self._changed = {frame: found}
-        return self._changed[frame]
+            found = watch.latest(self.scene, self.layer, dict(then), True) if then else None
+            self._looked = {frame: found}
+        return self._looked[frame]
 
     def filmed(self) -> tuple[str, NDArray[np.float32]] | None:
         """The name and the picture of the footage that the things are put over, at this frame.

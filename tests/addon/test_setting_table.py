@@ -180,6 +180,15 @@ def test_all_that_a_plate_shows_is_in_its_key(scene, tmp_path):
         assert changed(scene, change), number
 
 
+def test_things_that_moved_make_another_plate(scene):
+    """Cycles renders the light of suns on them as they are now."""
+    field = SimpleNamespace(about=About(key="a", fingerprint={"Object 'Matt'": "as it was"}))
+    one = light_key(scene, scene.world, None, field)
+    assert one == light_key(scene, scene.world, None, field)
+    scene.objects["Matt"].location.x += 1
+    assert one != light_key(scene, scene.world, None, field)
+
+
 def test_another_field_makes_another_plate(scene):
     def field(**about):
         return SimpleNamespace(about=About(**about))
