@@ -10,7 +10,7 @@ import fnmatch
 import os
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 import bpy
 
@@ -40,7 +40,13 @@ def option() -> str:
     return ALLOWED
 
 
-def quietly() -> dict[str, Any]:
+class Quietly(TypedDict, total=False):
+    """Options of `subprocess.Popen`."""
+
+    creationflags: int
+
+
+def quietly() -> Quietly:
     """How another Blender is started: on Windows without a console window that would flash, and
     with a lower priority than the artist's work."""
     return {"creationflags": 0x08000000 | 0x00004000} if sys.platform == "win32" else {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Protocol
 
 import bpy
 
@@ -17,6 +17,19 @@ from ...core.regular import open_regular
 _END_OF_JPEG = b"\xff\xd9"
 # Cameras write so many bytes behind a JPEG at most: in these its end is looked for.
 _BEHIND = 1 << 16
+
+
+class Timing(Protocol):
+    """What decides the picture of a sequence or movie at a frame: an image's user, or a node."""
+
+    @property
+    def frame_duration(self) -> int: ...
+    @property
+    def frame_start(self) -> int: ...
+    @property
+    def frame_offset(self) -> int: ...
+    @property
+    def use_cyclic(self) -> bool: ...
 
 
 @dataclass(frozen=True)
@@ -31,11 +44,8 @@ class Shown:
     held: bool
 
 
-def shown_at(timing: Any, frame: int) -> Shown:
-    """The picture that an image's user or node shows at a frame, as Blender counts.
-
-    timing: has `frame_duration`, `frame_start`, `frame_offset` and `use_cyclic`.
-    """
+def shown_at(timing: Timing, frame: int) -> Shown:
+    """The picture that an image's user or node shows at a frame, as Blender counts."""
     length = timing.frame_duration
     if length == 0:
         return Shown(0, False)

@@ -21,8 +21,10 @@ from ...core.exr.window import Box
 from ..blender.compositing import choose, compositor, darkroom, turned_off
 from ..blender.markers import camera_of
 from ..blender.pictures import put
+from ..blender.sequences import Timing
 from ..stage.stage import picture_size
 from . import footage_file
+from .footage_file import Source
 
 # How footage of another shape fills the frame: the compositor's name by the camera's name.
 _FILLS = {"STRETCH": "Stretch", "FIT": "Fit", "CROP": "Crop"}
@@ -40,8 +42,8 @@ class Footage:
     is seen when, or None; fills: how the footage fills the frame, a key of `_FILLS`.
     """
 
-    source: bpy.types.Image | bpy.types.MovieClip
-    timing: bpy.types.ImageUser | bpy.types.Node | _Timing | None = None
+    source: Source
+    timing: Timing | None = None
     fills: str = "STRETCH"
 
     @property
@@ -242,7 +244,7 @@ def _size(box: Box) -> tuple[int, int]:
     return box[2] - box[0] + 1, box[3] - box[1] + 1
 
 
-def _pixels(source: bpy.types.Image | bpy.types.MovieClip, file: Path | None) -> tuple[int, int]:
+def _pixels(source: Source, file: Path | None) -> tuple[int, int]:
     """The width and height of an image or clip; where Blender does not know them, of the file."""
     if min(source.size) or file is None or not file.is_file():
         return tuple(source.size)

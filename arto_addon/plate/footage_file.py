@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import bpy
 
 from ...core.errors import ExrError, SceneError
-from ..blender.sequences import Shown, damage, file_of, number_of, shown_at, whole_size
+from ..blender.sequences import Shown, Timing, damage, file_of, number_of, shown_at, whole_size
+
+# What footage is.
+Source = bpy.types.Image | bpy.types.MovieClip
 
 
-def file_at(source: Any, timing: Any, frame: int) -> Path | None:
+def file_at(source: Source, timing: Timing | None, frame: int) -> Path | None:
     """The file of an image or clip that is shown at a frame of the scene; None without such a file.
 
     timing: an image's user or node. The file may be missing.
@@ -25,7 +27,7 @@ def file_at(source: Any, timing: Any, frame: int) -> Path | None:
     return file_of(path, _shown(source, timing, frame, path).number)
 
 
-def _shown(source: Any, timing: Any, frame: int, path: Path) -> Shown:
+def _shown(source: Source, timing: Timing | None, frame: int, path: Path) -> Shown:
     """Which picture of a sequence or movie is shown at a frame."""
     if isinstance(source, bpy.types.MovieClip):
         first = number_of(path) if source.source == "SEQUENCE" else 1
@@ -34,7 +36,7 @@ def _shown(source: Any, timing: Any, frame: int, path: Path) -> Shown:
     return shown_at(timing, frame) if timing is not None else Shown(frame, False)
 
 
-def check(source: Any, timing: Any, frame: int) -> str:
+def check(source: Source, timing: Timing | None, frame: int) -> str:
     """Look at what an image or clip shows at a frame; returns a warning in words, or "".
 
     Raises SceneError where the file of the frame is missing or damaged, where it is of another size
@@ -76,7 +78,7 @@ def check(source: Any, timing: Any, frame: int) -> str:
     return warning if held else ""
 
 
-def _check_movie(source: Any, timing: Any, frame: int, path: Path) -> None:
+def _check_movie(source: Source, timing: Timing | None, frame: int, path: Path) -> None:
     """Raise SceneError where a movie does not have the frame that is shown."""
     number, length = _shown(source, timing, frame, path).number, source.frame_duration
     if length > 1 and not 1 <= number <= length:

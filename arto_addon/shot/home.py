@@ -7,13 +7,15 @@ the folder of the original .blend.
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import bpy
 
 from ...core.errors import SceneError
 
+_Block = TypeVar("_Block", bound=bpy.types.ID)
 _home: list[str] = []
 
 
@@ -63,7 +65,7 @@ def library_of(block: bpy.types.ID) -> str:
     return str(Path(bpy.path.abspath(library.filepath, library=library.parent)).resolve())
 
 
-def of_library(blocks: Any, name: str, library: str) -> Any:
+def of_library(blocks: Iterable[_Block], name: str, library: str) -> _Block | None:
     """The data-block of a name that is from a library, or from the file itself (empty), or None.
 
     A library may have one of the same name as the file has.

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import bpy
 from mathutils import Matrix, Vector
@@ -28,6 +28,9 @@ _OF_CAMERA: dict[str, tuple[str, ...]] = {
 }
 
 
+_Block = TypeVar("_Block", bound=bpy.types.ID)
+
+
 @dataclass(frozen=True)
 class Around:
     """What is around a world at a frame: the scene, its view layer, and what both depend on.
@@ -39,25 +42,28 @@ class Around:
     layer: bpy.types.ViewLayer
     depsgraph: bpy.types.Depsgraph | None
 
-    def evaluated(self, block: Any) -> Any:
+    def evaluated(self, block: _Block) -> _Block:
         return block.evaluated_get(self.depsgraph) if self.depsgraph else block
 
-    def seen_from(self) -> Matrix:
-        """The matrix from the world to the camera, as Cycles has it: +Z is forward, no scale."""
+    def camera(self) -> bpy.types.Object:
+        """The scene's camera at the frame. Raises SceneError without one."""
         camera = camera_of(self.scene)
         if camera is None:
             raise SceneError(
                 "the world depends on the camera, and the scene has none: add one, or make one "
                 "the scene's camera"
             )
-        place, turn, _ = self.evaluated(camera).matrix_world.decompose()
+        return self.evaluated(camera)
+
+    def seen_from(self) -> Matrix:
+        """The matrix from the world to the camera, as Cycles has it: +Z is forward, no scale."""
+        place, turn, _ = self.camera().matrix_world.decompose()
         return Matrix.Diagonal((1, 1, -1, 1)) @ Matrix.LocRotScale(place, turn, None).inverted()
 
     def frame(self) -> tuple[str, list[Vector]]:
         """The camera's type and the corners of its frame: right top, right bottom, left bottom."""
-        camera = self.evaluated(camera_of(self.scene))
-        kind = camera.data.type
-        return kind, list(camera.data.view_frame(scene=self.scene))[:3]
+        data = self.camera().data
+        return data.type, list(data.view_frame(scene=self.scene))[:3]
 
     def property(self, name: str) -> tuple[float, float, float, float]:
         """What an Attribute node of the kind View Layer gives: of layer, scene or world.
@@ -73,7 +79,7 @@ class Around:
         return 0.0, 0.0, 0.0, 0.0
 
 
-def _values(owner: Any, name: str) -> Iterator[Any]:
+def _values(owner: bpy.types.ID | None, name: str) -> Iterator[object]:
     if owner is None:
         return
     if name in owner.keys():  # noqa: SIM118 - a data-block is no dictionary
@@ -134,7 +140,7 @@ def check_pixels(scene: bpy.types.Scene, world: bpy.types.World) -> None:
             )
 
 
-def _moves(block: Any) -> bool:
+def _moves(block: bpy.types.ID) -> bool:
     """Whether a data-block has keys, drivers or strips."""
     animation = block.animation_data
     return animation is not None and bool(
@@ -227,7 +233,7 @@ def still(
         layer = place.view_layers[0]
         around = Around(place, layer, layer.depsgraph)
         copy = around.evaluated(world).copy()
-        made: list[Any] = [copy]
+        made: list[bpy.types.ID] = [copy]
         held.callback(bpy.data.batch_remove, made)
         copy.animation_data_clear()
         # A node that shows nothing must not raise, and may stay as it is.
@@ -245,7 +251,7 @@ def _still_tree(
     around: Around,
     camera: bool,
     shown: set[tuple[str, str]],
-    made: list[Any],
+    made: list[bpy.types.ID],
     groups: dict[str, bpy.types.NodeTree],
 ) -> None:
     """Make a tree of ours and the groups in it stand still. groups: those that are done."""
@@ -272,7 +278,10 @@ def _still_tree(
 
 
 def _relink(
-    tree: bpy.types.NodeTree, of: bpy.types.NodeSocket, to: Any, number: Any = None
+    tree: bpy.types.NodeTree,
+    of: bpy.types.NodeSocket,
+    to: bpy.types.NodeSocket,
+    number: bpy.types.NodeSocket | None = None,
 ) -> None:
     """Let what an output feeds be fed by another; number: where a single number is asked."""
     for link in list(of.links):
@@ -280,7 +289,7 @@ def _relink(
         tree.links.new(asked, link.to_socket)
 
 
-def _dot(nodes: Nodes, vector: Any, row: Iterable[float]) -> Any:
+def _dot(nodes: Nodes, vector: bpy.types.NodeSocket, row: Iterable[float]) -> bpy.types.NodeSocket:
     """The value of a vector on an affine row of four numbers."""
     x, y, z, at = row
     found = nodes.add("ShaderNodeVectorMath", vector, (x, y, z), operation="DOT_PRODUCT")
@@ -288,13 +297,13 @@ def _dot(nodes: Nodes, vector: Any, row: Iterable[float]) -> Any:
     return nodes.math("ADD", value, at) if at else value
 
 
-def _moved(nodes: Nodes, vector: Any, matrix: Matrix) -> Any:
+def _moved(nodes: Nodes, vector: bpy.types.NodeSocket, matrix: Matrix) -> bpy.types.NodeSocket:
     """A vector on which a matrix acts, as a point."""
     return nodes.add("ShaderNodeCombineXYZ", *(_dot(nodes, vector, matrix[i]) for i in range(3))
                      ).outputs[0]  # fmt: skip
 
 
-def _direction(nodes: Nodes) -> Any:
+def _direction(nodes: Nodes) -> bpy.types.NodeSocket:
     """The direction that is looked in: for a world the position of Cycles' shading point."""
     return nodes.tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"]
 

@@ -6,7 +6,6 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
@@ -25,7 +24,7 @@ def of_textures(scene: bpy.types.Scene) -> list[object]:
     return [scene.render.use_simplify, *(getattr(scene.cycles, n, None) for n in _TEXTURES)]
 
 
-def like_textures(scene: bpy.types.Scene, settings: list[Any]) -> None:
+def like_textures(scene: bpy.types.Scene, settings: list[object]) -> None:
     """Set on another scene what `of_textures` has read."""
     scene.render.use_simplify = settings[0]
     for name, value in zip(_TEXTURES, settings[1:], strict=True):
