@@ -258,7 +258,7 @@ def test_footage_that_is_no_picture_is_said_before_anything_is_written(tmp_path,
         path, match = tmp_path / "filmed.exr", "1 pixels that are infinite or not a number"
         pixels = np.ones((18, 24, 4), np.float32)
         pixels[3, 3, 0] = np.nan
-        exr.write(path, {"": pixels})
+        exr.write(path, {"": pixels}, finite=False)
     scene.arto.footage = bpy.data.images.load(str(path))
     scenes = len(bpy.data.scenes)
     with pytest.raises(SceneError, match=match):
