@@ -97,6 +97,7 @@ def asked(
         prepare(on, layers=len(patterns) + grain)
         # the other takes need light alone, and each pass less saves memory
         on.scene.view_layers[0].use_pass_position = name == WHOLE
+        on.portals = portals_seen(on, seen)
         if name == WHOLE:
             see_behind(on)
         if name == THINGS:
@@ -111,7 +112,7 @@ def asked(
             blender=bpy.app.version_string,
             colour_space=working_space(),
             film_transparent=scene.render.film_transparent,
-            portals=portals_seen(on),
+            portals=on.portals,
             changed=dict(on.changed),
             catchers=tuple(sorted(set(seen.catchers))) if seen.catchers else None,
             take=name if seen.catchers else None,

@@ -21,7 +21,9 @@ from ...core.capture.names import BEHIND_LIGHT
 from ...core.errors import SceneError
 from ...core.hemicube import Hemicube
 from ..blender.markers import camera_of
-from ..blender.nodes import Nodes, shader_tree, trees
+from ..blender.nodes import Nodes
+from ..blender.reached import reached
+from ..stage.bounds import Rendered
 from ..stage.stage import Stage
 
 
@@ -42,17 +44,19 @@ def see_behind(on: Stage) -> None:
     layer.use_pass_environment = True
 
 
-def portals_seen(on: Stage) -> bool | None:
+def portals_seen(on: Stage, seen: Rendered) -> bool | None:
     """Whether a capture puts what Ray Portals show of the world into the light of the patches.
 
-    None where no material in the file has a Ray Portal that turns rays: through others the world is
-    seen where the camera looks. on: a prepared stage. Raises SceneError where the patches are near.
+    None where no material has a Ray Portal that turns rays: through others the world is seen where
+    the camera looks. on: a prepared stage. Raises SceneError where the patches are near.
     """
+    materials = [bpy.data.materials[name, library or None] for name, library in seen.materials]
+    if override := on.scene.view_layers[0].material_override:
+        materials = [override]
     if not any(
         node.bl_idname == "ShaderNodeBsdfRayPortal" and node.inputs["Direction"].is_linked
-        for material in bpy.data.materials
-        for tree in trees(shader_tree(material), set())
-        for node in tree.nodes
+        for material in materials
+        for node in reached(material)
     ):
         return None
     # `prepare` notes what the artist's film is

@@ -17,7 +17,6 @@ from ..stage.small import parts_of, small
 from ..stage.stage import Stage
 from ..work import Steps
 from . import planes
-from .behind import portals_seen
 
 SAMPLES = 32
 
@@ -40,7 +39,7 @@ def probed(on: Stage, hemicube: Hemicube) -> Steps[NDArray]:
     fine = replace(hemicube, patches=FINEST)
     patterns = pattern_set("white")
     images = [(k, "white") for k in range(len(fine))]
-    portals = bool(portals_seen(on))
+    portals = bool(on.portals)
     with small(on, SAMPLES), planes.lit(on, fine, patterns, images, portals=portals):
         parts = yield from parts_of(on, f"probing {len(fine)} directions")
     found = [(GROUP.search(name), pixels) for name, pixels in parts.items()]

@@ -25,6 +25,7 @@ from ..stage.stage import stage
 from ..stage.takes import TAKES, WHOLE, take
 from ..work import PLAIN, Batch, Progress, Steps, attempted, looked, of_piece, part_of, strictly
 from . import planes, probe, room
+from .behind import portals_seen
 from .capture import capture
 from .check import check_patterns, check_place, check_scene
 from .patterns import patterns_of
@@ -128,8 +129,9 @@ def together(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> 
     route, caution, probes = Route(settings.route), None, []
     for frame in some:
         scene.frame_set(frame)
-        with stage(scene, view_layer) as on, take(rendered(on), WHOLE):
+        with stage(scene, view_layer) as on, take(there := rendered(on), WHOLE):
             prepare(on, layers=len(patterns_of(settings)) + settings.grain)
+            on.portals = portals_seen(on, there)
             here, told = yield from light_route(on, hemicube)
             route = Route.SAMPLED if here == Route.SAMPLED else route
             caution = caution or told

@@ -27,7 +27,8 @@ class Rendered:
 
     low, high: the corners (3,) of the box around all that a render shows; catchers: the names of
     the objects that are rendered as shadow catchers; flagged: the objects that have the flag Shadow
-    Catcher, by which they or their instances are catchers; things: all other rendered objects.
+    Catcher, by which they or their instances are catchers; things: all other rendered objects;
+    materials: of all rendered objects.
     """
 
     low: NDArray[np.float64] = field(default_factory=lambda: np.full(3, np.inf))
@@ -35,6 +36,7 @@ class Rendered:
     catchers: list[str] = field(default_factory=list)
     flagged: set[Name] = field(default_factory=set)
     things: set[Name] = field(default_factory=set)
+    materials: set[Name] = field(default_factory=set)
     # makers: objects that make instances of catchers. made: objects that are a catcher only because
     # a catcher makes instances of them.
     makers: set[Name] = field(default_factory=set)
@@ -62,6 +64,11 @@ class Rendered:
     def note(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
         """Note whether an instance is rendered as a catcher or as a thing."""
         one, parent = instance.object, instance.parent
+        slots = [slot.material for slot in one.material_slots]
+        # those that geometry nodes give have no slot
+        for material in (*slots, *getattr(one.data, "materials", ())):
+            if material:
+                self.materials.add(_name(material))
         if one.is_shadow_catcher:
             self.catchers.append(one.name)
             self.flagged.add(_name(one))
@@ -76,7 +83,7 @@ class Rendered:
             self.things.add(_name(one))
 
 
-def _name(evaluated: bpy.types.Object) -> Name:
+def _name(evaluated: bpy.types.ID) -> Name:
     original = evaluated.original
     return original.name, original.library.filepath if original.library else ""
 

@@ -47,6 +47,8 @@ class Stage:
         self.scene = scene
         self.changed: dict[str, list[object]] = {}
         self.pace: Pace | None = None  # How fast the last small render was.
+        # Whether Ray Portals show the patches to the camera; see `capture.behind`.
+        self.portals: bool | None = None
         self.own_groups: list[str] = []  # The artist's light groups that have objects.
         self._made: list[bpy.types.ID] = []
 

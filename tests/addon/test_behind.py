@@ -98,9 +98,12 @@ def test_what_is_seen_through_panes(tmp_path):
         left, right = 1.3 * i - 2, 1.3 * i - 0.7
         corners = [(left, -3, 0.2), (right, -3, 0.2), (right, -3, 6), (left, -3, 6)]
         add_mesh(scene, "pane", corners, [(0, 1, 2, 3)], glass)
+    scene.arto.write_data = True
     picture = run_all(scene)
+    through = exr.read(tmp_path / "relit_data.exr")["through"]
     one, two = (own_picture(scene, 256, tmp_path, seed) for seed in (1, 2))
     assert (picture[..., 3] == 1).all()
+    np.testing.assert_allclose(through[2, 4], (0.9, 0.4, 0.1), atol=1e-3)
     for columns in (slice(0, 8), slice(8, 16), slice(16, 24)):
         mine, truth, other = (p[:, columns, :3] for p in (picture, one, two))
         assert np.abs(mine - truth).mean() < 2 * np.abs(truth - other).mean() + 0.01
