@@ -220,8 +220,9 @@ def failed(names: Iterable[str], error: ArtoError, share: float, batch: Batch) -
     """Tell that pieces of a work failed. Raises the error, unless the batch keeps going."""
     if not batch.keep_going or isinstance(error, CancelledError):
         raise error
+    # without its traceback, which would hold the arrays of what failed
     for name in names:
-        yield Failed(share, f"{name} failed: {error}", name, error)
+        yield Failed(share, f"{name} failed: {error}", name, error.with_traceback(None))
 
 
 def attempted(steps: Steps[_Made], name: str, share: float, batch: Batch) -> Steps[_Made | None]:
@@ -252,7 +253,7 @@ def looked(
     other pieces.
     """
     for name, error in wrong.items():
-        yield Failed(0.0, f"{name} cannot be made: {error}", name, error)
+        yield Failed(0.0, f"{name} cannot be made: {error}", name, error.with_traceback(None))
     if not wrong or (batch.keep_going and len(wrong) < total):
         return
     first = next(iter(wrong.values()))

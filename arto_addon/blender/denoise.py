@@ -67,7 +67,7 @@ def with_lamps(
 
 
 # The render settings of a scene that the compositor's denoiser reads.
-_DENOISER = ("compositor_denoise_device", "compositor_denoise_final_quality")
+DENOISER = ("compositor_denoise_device", "compositor_denoise_final_quality")
 
 
 def denoise(
@@ -113,6 +113,6 @@ def denoise(
                 tree.links.new(socket, node.inputs[name])
             total = node.outputs[0] if total is None else mixed(tree, "ADD", total, node.outputs[0])
         if like is not None:
-            for name in _DENOISER:
+            for name in DENOISER:
                 setattr(on.scene.render, name, getattr(like.render, name))
         return np.ascontiguousarray(on.composite(total, (width, height), "denoising")[..., :3])

@@ -14,6 +14,7 @@ import bpy
 from ...core.errors import ArtoError
 from ...core.field.field import Field
 from ...core.shot import Shot
+from ..blender import denoise
 from ..plate import mattes
 from ..plate.footage import TIMING, footage
 from ..settings.setting import Decides
@@ -55,6 +56,12 @@ def light_key(
     settings = scene.arto
     of: list[object] = [key, round(strength, 5), round(turn, 5), scene.render.film_transparent]
     of.append(scene.cycles.film_transparent_glass)
+    if settings.lamps:  # their render has noise, and is clamped as the artist's own is
+        cycles = scene.cycles
+        of += [settings.seed, cycles.use_animated_seed]
+        of += [cycles.sample_clamp_direct, cycles.sample_clamp_indirect]
+    if settings.denoise:
+        of += [getattr(scene.render, name) for name in denoise.DENOISER]
     of += [str(value) for value in values(settings, Decides.PLATE).values()]
     of += [sorted((n, round(g, 5)) for n, g in gains_of(scene).items())]
     of += [_shot(scene, layer), _field(field), _footage(scene), _groups(scene)]

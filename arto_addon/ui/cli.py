@@ -6,6 +6,7 @@ say what there is of a shot.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import sys
@@ -47,7 +48,8 @@ def command(arguments: list[str]) -> int:
     code = main(arguments)
     sys.stdout.flush()
     if bpy.app.background and bpy.app.binary_path:
-        os.dup2(2, 1)
+        with contextlib.suppress(OSError):  # on Windows there may be no standard error
+            os.dup2(2, 1)
     return code
 
 
