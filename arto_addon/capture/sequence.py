@@ -93,6 +93,8 @@ def look(
             check_patterns(scene)
             if place:
                 check_place(scene, view_layer)
+            with stage(scene, view_layer) as on:
+                rendered(on).bounds()  # raises where the frame shows nothing, or what cannot be
         except ArtoError as e:
             wrong[frame] = e
     return wrong

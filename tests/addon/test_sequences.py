@@ -95,6 +95,19 @@ def test_frames_are_looked_at_before_the_first_is_rendered(scene, monkeypatch):
     assert said.renders == 1 and said.failed == ["frame 3"]
 
 
+def test_a_frame_that_shows_nothing_is_found_first(scene):
+    for thing in list(scene.objects):
+        if thing.type == "MESH":
+            thing.hide_render = False
+            thing.keyframe_insert("hide_render", frame=1)
+            thing.hide_render = True
+            thing.keyframe_insert("hide_render", frame=2)
+    said = Renders()
+    with pytest.raises(SceneError, match="shows nothing"):
+        work.run(capture_frames(scene, scene.view_layers[0].name, [1, 2, 3]), said)
+    assert said.renders == 0 and said.failed == ["frame 2", "frame 3"]
+
+
 def test_one_file_of_mattes_for_several_frames_is_refused(scene, tmp_path):
     """Of the program that wrote it nothing says of which frame it is."""
     captured(scene, [1, 2])
