@@ -232,7 +232,7 @@ def test_bad_output_and_bad_world_lose_nothing(tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("")
     scene.arto.output = str(blocked / "relit.exr")
-    with pytest.raises(ArtoError, match="choose a folder"):
+    with pytest.raises(ArtoError, match="choose another"):
         relit(scene)
     assert (tmp_path / "relit.exr").read_bytes() == kept
     damaged = paths.field_folder(scene) / "tile_0000.arto"
