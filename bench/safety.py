@@ -51,27 +51,39 @@ def safety() -> list[dict[str, Any]]:
     return rows
 
 
+# Work that takes so long is done once more, to see how much memory it takes. Seeing slows it down.
+_LONG = 0.1
+
+
 def _outcome(work: Work, usual: float) -> tuple[str, float]:
     """What comes of some work, and the seconds of a processor that it took."""
     begun = time.process_time()
-    tracemalloc.start()
-    try:
-        with _alarm(60 * SECONDS):
-            said = "right" if work() else "wrong"
-    except TYPED:
-        said = "typed error"
-    except safety_others.LostError:
-        said = "lost"
-    except TimeoutError:
-        said = "hang"
-    except Exception:
-        said = "traceback"
-    finally:
+    said = _tried(work)
+    took = time.process_time() - begun
+    if usual and took > usual + SECONDS:
+        return "hang", took
+    if usual and took > usual + _LONG and said == "typed error":
+        tracemalloc.start()
+        _tried(work)
         most = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
-    took = time.process_time() - begun
-    over = (usual and took > usual + SECONDS) or most > BYTES
-    return ("hang" if over else said), took
+        if most > BYTES:
+            return "hang", took
+    return said, took
+
+
+def _tried(work: Work) -> str:
+    try:
+        with _alarm(60 * SECONDS):
+            return "right" if work() else "wrong"
+    except TYPED:
+        return "typed error"
+    except safety_others.LostError:
+        return "lost"
+    except TimeoutError:
+        return "hang"
+    except Exception:
+        return "traceback"
 
 
 @contextlib.contextmanager

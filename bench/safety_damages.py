@@ -18,6 +18,7 @@ from arto.core import arrays, exr
 from arto.core.capture import capture_set
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.capture.head import HEADER as CAPTURE
+from arto.core.description import MOST_BYTES
 from arto.core.field.field import Field
 from arto.core.field.head import HEADER as FIELD
 from arto.core.field.tile_file import TileFile, written
@@ -223,6 +224,22 @@ def _descriptions(folder: Path) -> Cases:
     yield from _of_file(capture / CAPTURE, same, 90)
 
 
+def _large(folder: Path) -> Cases:
+    """Descriptions as large as one may be, of what takes the most memory."""
+    capture = captured(folder / "capture")
+    head = capture / CAPTURE
+    good = head.read_bytes()
+
+    def opened() -> bool:
+        return CaptureSet(capture).shape == SHAPE
+
+    yield "as it is", opened
+    for what, many in (("lists", b"[],"), ("numbers", b"0.5,"), ("texts", b'"abcd%d",')):
+        for size in (MOST_BYTES - (1 << 20), MOST_BYTES + 1):
+            content = b'{"a": [' + many * (size // len(many)) + b"1]}"
+            yield f"{size >> 20} MB of {what}", _with(head, content, good, opened)
+
+
 def _jobs(folder: Path) -> Cases:
     """Heads of a farm's job and part, and what the window tells a second Blender."""
     from arto.arto_addon.farm import head as heads
@@ -350,6 +367,7 @@ KINDS: dict[str, Callable[[Path], Cases]] = {
     "image": _images,
     "map": _maps,
     "description": _descriptions,
+    "large": _large,
     "job": _jobs,
     "index": _indices,
     "no file": _no_files,

@@ -20,7 +20,7 @@ from pathlib import Path
 from .regular import is_folder, json_object
 
 # No description is larger.
-_MOST = 64 << 20
+_MOST = 16 << 20
 # What systems put into folders by themselves.
 _SYSTEM = r"\.DS_Store|Thumbs\.db|desktop\.ini|\.nfs\w+"
 

@@ -36,8 +36,9 @@ from .region import Region
 from .regular import WITHHELD, read_regular
 from .signed import parsed
 
-# The largest file that is read. Fingerprints of 100,000 objects take 8 MB.
-MOST_BYTES = 64 << 20
+# The largest file that is read. Fingerprints of 100,000 objects take 8 MB. What Python makes of a
+# file takes up to eight times as much.
+MOST_BYTES = 16 << 20
 LARGEST_SIDE = 65536
 MOST_TILES = 100_000
 _Choice = TypeVar("_Choice", bound=str)

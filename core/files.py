@@ -138,6 +138,9 @@ def settle(folder: Path) -> None:
         kind = marked.kind_of(old)
         if kind:
             marked.remove_quietly(old, kind, old.parent)
+        else:  # a removal was killed at its very end
+            with contextlib.suppress(OSError):
+                marked.remove_empty(old)
     else:
         moved(old, folder)
 

@@ -196,7 +196,16 @@ def remove(folder: Path, kind: Kind, inside: Path) -> None:
     if not os.path.lexists(folder):
         return
     check(folder, kind, inside)
-    shutil.rmtree(folder)
+    with contextlib.suppress(OSError):
+        mark(folder, kind)  # of the version before; where there is no room, what goes makes some
+    # The mark goes last: what a killed process leaves of the folder is still known.
+    for there in [path for path in folder.iterdir() if path.name != MARK]:
+        if is_folder(there):
+            shutil.rmtree(there)
+        else:
+            there.unlink()
+    (folder / MARK).unlink(missing_ok=True)
+    folder.rmdir()
 
 
 def remove_empty(folder: Path) -> None:

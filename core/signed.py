@@ -25,6 +25,8 @@ from .files import write_text
 
 # The name of the digest, what stands before it, and what a description ends with.
 DIGEST = "digest"
+# The most lists and objects of a description: each takes far more memory than its two letters.
+MOST_LISTS = 1_000_000
 _BEFORE, _END = f',\n "{DIGEST}": ', "\n}"
 
 
@@ -75,8 +77,10 @@ def parsed(text: str) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        The text is no JSON object, or was changed.
+        The text is no JSON object, has too many lists, or was changed.
     """
+    if text.count("[") + text.count("{") > MOST_LISTS:
+        raise ValueError(f"it has more than {MOST_LISTS} lists")
     data = json.loads(text, parse_constant=_refuse)
     if not isinstance(data, dict):
         raise ValueError("it is no description")

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import arto
 import numpy as np
@@ -63,6 +66,46 @@ def test_only_one_module_removes() -> None:
             ):
                 found.add(path.relative_to(root).as_posix())
     assert found == {"core/marked.py", "core/files.py"}
+
+
+@pytest.mark.parametrize("marks", [True, False])
+def test_what_a_killed_removal_leaves_is_removed_by_the_next(
+    tmp_path: Path, monkeypatch, marks: bool
+) -> None:
+    """However far it came: else the rest is in the way for ever, as somebody else's."""
+    for killed in range(8):
+        made = marked.make(tmp_path / "field", "field")
+        for name in ("field.json", "tile_0000.arto", "proxy_2", "proxy_4"):
+            if "proxy" in name:
+                (made / name).mkdir()
+                (made / name / "a").touch()
+            else:
+                (made / name).write_text('{"format": "ARTO reflectance field", "version": 3}')
+        if not marks:  # as the version before made it
+            (made / marked.MARK).unlink()
+        left = [killed]
+
+        def count(real: Callable[..., Any], left: list[int] = left) -> Callable[..., Any]:
+            def run(*args: Any, **options: Any) -> Any:
+                left[0] -= 1
+                if left[0] < 0:
+                    raise KeyboardInterrupt
+                return real(*args, **options)
+
+            return run
+
+        with monkeypatch.context() as m, contextlib.suppress(KeyboardInterrupt):
+            m.setattr(Path, "unlink", count(Path.unlink))
+            m.setattr(Path, "rmdir", count(Path.rmdir))
+            m.setattr(marked.shutil, "rmtree", count(shutil.rmtree))
+            marked.remove(made, "field", tmp_path)
+        assert made.exists() == (killed < 6)
+        if made.exists():  # as where a field was replaced by another
+            made.rename(tmp_path / "field.old")
+        marked.make(made, "field")
+        settle(made)
+        assert [path.name for path in tmp_path.iterdir()] == ["field"]
+        marked.remove(made, "field", tmp_path)
 
 
 def test_a_folder_with_a_mark_is_removed(tmp_path: Path) -> None:
