@@ -103,7 +103,7 @@ def _white(on: Stage, hemicube: Hemicube) -> bpy.types.World:
     )
 
 
-def _through_more(on: Stage, hemicube: Hemicube, found: np.ndarray, own: np.ndarray) -> Steps:
+def _through_more(on: Stage, hemicube: Hemicube, found: np.ndarray, own: np.ndarray) -> Steps[bool]:
     """Find out whether the scene's own limit of transparent bounces makes the difference -> bool.
 
     The patches' light passes more surfaces than that limit, as the patches are transparent too. So

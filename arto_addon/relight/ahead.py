@@ -85,7 +85,7 @@ def _named(base: Path, file: Path | None, number: int | None) -> Path:
 
 def look(
     scene: bpy.types.Scene, view_layer: str, pictures: Sequence[Wanted], strict: bool
-) -> Steps:
+) -> Steps[dict[Wanted, ArtoError]]:
     """Look at all that some pictures need -> what is wrong, an ArtoError by picture.
 
     The scene is put back to its frame. strict: whether the scene may not have changed since the

@@ -73,7 +73,7 @@ def write(shown: Shown, ready: Ready, made: Made, about: dict[str, str]) -> Step
 
 def _written(
     shown: Shown, ready: Ready, made: Made, about: dict[str, str], opener: Opener
-) -> Steps:
+) -> Steps[None]:
     """Write the plate and the files beside it. about: of each header; opener: see `Together`."""
     scene, path, picture, caught = shown.scene, ready.lit.path, made.picture, made.caught
     settings = scene.arto
