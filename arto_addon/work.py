@@ -218,11 +218,13 @@ PLAIN = Batch()
 
 def failed(names: Iterable[str], error: ArtoError, share: float, batch: Batch) -> Iterator[Failed]:
     """Tell that pieces of a work failed. Raises the error, unless the batch keeps going."""
-    if not batch.keep_going or isinstance(error, CancelledError):
+    if isinstance(error, CancelledError):
         raise error
     # without its traceback, which would hold the arrays of what failed
     for name in names:
         yield Failed(share, f"{name} failed: {error}", name, error.with_traceback(None))
+    if not batch.keep_going:
+        raise error
 
 
 def attempted(steps: Steps[_Made], name: str, share: float, batch: Batch) -> Steps[_Made | None]:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import bpy
+import numpy as np
+from numpy.typing import NDArray
 
 from ...core import exr
 from ...core.errors import ExrError
@@ -79,13 +81,16 @@ def number_of(path: Path) -> int | None:
 _DIGITS = re.compile(r"(\d+)(?=\D*$)")
 
 
-def whole_size(path: Path) -> tuple[int, int] | None:
+def whole_size(path: Path, finite: bool = False) -> tuple[int, int] | None:
     """Decode a file of a picture -> its width and height; None where it cannot be decoded.
 
-    Of an EXR this is the display window. Raises ExrError for an EXR, with what is wrong with it.
+    Of an EXR this is the display window. finite: whether the colours of its picture must be
+    numbers. Raises ExrError for an EXR, with what is wrong with it.
     """
     if path.suffix.lower() == ".exr":
-        exr.whole_parts(path)
+        parts = exr.whole_parts(path)
+        if finite:
+            _check_finite(path, parts)
         _, (x0, y0, x1, y1) = exr.windows(path)
         return x1 - x0 + 1, y1 - y0 + 1
     if path.suffix.lower() in {".jpg", ".jpeg"} and _is_cut(path):
@@ -102,12 +107,27 @@ def whole_size(path: Path) -> tuple[int, int] | None:
         bpy.data.images.remove(image)
 
 
-def damage(path: Path) -> str:
-    """Say what is wrong with a file of a picture, in words; "" for a file that is whole."""
+def _check_finite(path: Path, parts: list[tuple[dict[str, Any], dict[str, NDArray]]]) -> None:
+    """Raise ExrError where a colour of the picture itself is infinite or not a number."""
+    for _, channels in parts:
+        planes = [channels[name] for name in "RGB" if name in channels]
+        same = planes and len({plane.shape for plane in planes}) == 1
+        bad = int((~np.isfinite(planes)).any(axis=0).sum()) if same else 0
+        if bad:
+            raise ExrError(
+                f"{path} has {bad} pixels that are infinite or not a number: repair them"
+            )
+
+
+def damage(path: Path, finite: bool = False) -> str:
+    """Say what is wrong with a file of a picture, in words; "" for a file that is whole.
+
+    finite: whether the colours of an EXR's picture must be numbers.
+    """
     if not path.is_file():
         return f"{path} is not there"
     try:
-        if whole_size(path) is None:
+        if whole_size(path, finite) is None:
             return f"{path} cannot be read, it is damaged or cut off"
     except ExrError as e:
         return str(e).partition(": ")[0]

@@ -100,7 +100,7 @@ def _state(path: Path) -> tuple[int, ...]:
 # argument of both functions is the state for which an answer holds.
 @lru_cache(4096)
 def _damage(path: Path, _: tuple[int, ...]) -> str:
-    return damage(path)
+    return damage(path, finite=True)
 
 
 @lru_cache(4096)

@@ -26,7 +26,7 @@ from ..plate.together import ENDINGS
 from ..shot import paths
 from ..shot.shot import check_same_shot, shot_of
 from ..work import Progress, Steps
-from ..world.check import check_images, check_world, differs_by_rays
+from ..world.check import check_file, check_images, check_world, differs_by_rays
 from ..world.images import files_at, image_nodes
 from . import layers
 from .shown import Shown, check_film
@@ -149,6 +149,10 @@ def _map(file: Path) -> ArtoError | None:
     """What is wrong with the file of an environment map."""
     if not file.is_file():
         return SceneError(f"there is no environment map {file}")
+    try:
+        check_file(file)
+    except SceneError as e:
+        return e
     if wrong := sequences.damage(file):
         return SceneError(f"{wrong}: copy it anew, or choose another HDRI")
     return None

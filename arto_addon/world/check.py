@@ -73,7 +73,7 @@ def check_images(world: bpy.types.World, frame: int) -> None:
             continue
         if node.image.source == "SEQUENCE":
             for path in files_at(node, frame):
-                _check_readable(path)
+                check_file(path)
         elif node.image.source in {"FILE", "MOVIE", "TILED"} and min(node.image.size) == 0:
             path = bpy.path.abspath(node.image.filepath, library=node.image.library)
             raise _unreadable(node.image.name, Path(path))
@@ -92,8 +92,8 @@ def _unreadable(name: str, path: Path) -> SceneError:
     )
 
 
-def _check_readable(path: Path) -> None:
-    """Raise SceneError where one file of a sequence cannot be read."""
+def check_file(path: Path) -> None:
+    """Raise SceneError where a file cannot be read as the image of a world."""
     try:
         alone = bpy.data.images.load(str(path))
     except RuntimeError as e:

@@ -262,10 +262,13 @@ def test_two_worlds_of_one_name_are_refused_before_work(tmp_path):
     assert all("one picture" in text for text in wrong(a, b) + wrong(a, a))
     (tmp_path / "cut.exr").write_bytes(a.read_bytes()[:-20])
     (tmp_path / "text.hdr").write_text("no picture")
+    some = {name: np.ones((2, 4, 3), np.float32) for name in ("diffuse", "glossy")}
+    exr.write(tmp_path / "layers.exr", some)
     for name, match in (
         ("none.exr", "no environment map"),
-        ("cut.exr", "HDRI"),
-        ("text.hdr", "HDRI"),
+        ("cut.exr", "damaged or cut off"),
+        ("text.hdr", "damaged or cut off"),
+        ("layers.exr", "an EXR of layers"),
     ):
         good, bad = wrong(other, tmp_path / name)
         assert not good and match in bad
