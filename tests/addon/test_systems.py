@@ -18,9 +18,12 @@ from arto.arto_addon.farm import job as farm_job
 from arto.arto_addon.farm.templates import job_name
 from arto.arto_addon.job import snapshot
 from arto.arto_addon.live import maps
+from arto.arto_addon.plate.header import time_code
 from arto.arto_addon.shot import home
-from arto.core import arrays
+from arto.arto_addon.world.check import check_images
+from arto.core import arrays, exr
 from arto.core.errors import FarmError, SceneError
+from arto.core.exr import TimeCode
 
 
 def test_a_path_on_another_drive_stays_as_it_is(monkeypatch, tmp_path):
@@ -177,3 +180,37 @@ def test_a_map_for_live_is_a_map(tmp_path, image):
     arrays.write(tmp_path / "map.npy", image)
     with pytest.raises(ValueError, match=r"map|number"):
         maps._map(tmp_path / "map.npy")
+
+
+def test_a_world_of_layers_is_no_damaged_world(tmp_path):
+    """Blender shows no picture of such a file, as of one that is cut off."""
+    plane = np.ones((4, 8, 3), np.float32)
+    exr.write(tmp_path / "layers.exr", {"ViewLayer.Combined": plane, "ViewLayer.Normal": plane})
+    exr.write(tmp_path / "cut.exr", {"": plane})
+    (tmp_path / "cut.exr").write_bytes((tmp_path / "cut.exr").read_bytes()[:-40])
+    world = bpy.data.worlds.new("Sky")
+    world.use_nodes = True
+    texture = world.node_tree.nodes.new("ShaderNodeTexEnvironment")
+    background = world.node_tree.nodes["Background"]
+    world.node_tree.links.new(texture.outputs[0], background.inputs["Color"])
+    for name, says in (("layers", "an EXR of layers"), ("cut", "damaged or cut off")):
+        texture.image = bpy.data.images.load(str(tmp_path / f"{name}.exr"))
+        with pytest.raises(SceneError, match=says):
+            check_images(world, 1)
+    bpy.data.worlds.remove(world)
+
+
+@pytest.mark.parametrize(
+    ("text", "moment"),
+    [
+        ("01:02:03:04", TimeCode(1, 2, 3, 4)),
+        ("23:59:59:59", TimeCode(23, 59, 59, 59)),
+        ("24:00:00:00", None),
+        ("-00:00:01:00", None),
+        ("00:00:00:75", None),
+        ("100:00:00:00", None),
+        ("", None),
+    ],
+)
+def test_a_moment_that_an_exr_cannot_have_is_left_out(text, moment):
+    assert time_code(text) == moment
