@@ -26,7 +26,9 @@ JOB: dict[str, Any] = {
     "blend": "shot.blend",
     "blender": "5.2.3 LTS",
     "scene": "Scene",
+    "library": "//set.blend",
     "view_layer": "ViewLayer",
+    "scripts": True,
     "settings": SETTINGS,
     "frames": [1, 2, 3],
     "subframe": 0.0,
@@ -51,6 +53,8 @@ OF_JOB: dict[str, list[Any]] = {
     "blend": [LONG, 3, []],
     "blender": [LONG, 5.2, {}],
     "scene": [LONG, 3, True],
+    "library": [LONG, 3, []],
+    "scripts": [0, 1, "yes"],
     "view_layer": [LONG, 3, [""]],
     "settings": [
         [],
