@@ -187,8 +187,8 @@ FILES = (
         name="cryptomatte",
         kind="text",
         title="Cryptomatte",
-        words="An EXR of your own render of this shot, whose Cryptomattes go into the data "
-        "file as they are",
+        words="An EXR of your own render of this shot (#### for the frame's number), whose "
+        "Cryptomattes go into the data file as they are",
         subtype="FILE_PATH",
         default="",
         work="relight",

@@ -123,12 +123,18 @@ def _do(verb: str, options: dict[str, Any], report: Report) -> None:
         work = {"capture": capture, "fit": fit, "relight": relight}[verb](scene, layer)
     run(_as_asked(work, batch, many), report)
     if verb == "capture" and named is None:
-        print(
-            "ARTO capture: the .blend was saved without the ID by which this capture is found when "
-            "the file has another name: save it with --save, or use the capture there by "
-            f"--command arto adopt --from '{paths.place(scene, layer).folder}'",
-            flush=True,
-        )
+        _say_unsaved(verb, paths.place(scene, layer).folder)
+
+
+def _say_unsaved(verb: str, folder: Path) -> None:
+    """Say that the .blend on disk does not have the ID of what was captured. folder: the shot's."""
+    save = "capture with --save, " if verb == "capture" else ""
+    print(
+        f"ARTO {verb}: the .blend was saved without the ID by which this capture is found when the "
+        f"file has another name: {save}save it in Blender, or use the capture in the other file by "
+        f"--command arto adopt --from '{folder}'",
+        flush=True,
+    )
 
 
 def _as_asked(work: Steps[_Made], batch: Batch, many: bool) -> Steps[_Made]:
@@ -226,6 +232,7 @@ def _of_a_farm(verb: str, options: dict[str, Any], report: Report, batch: Batch)
     """Render a part of a farm's job, or gather the parts. The settings are those of the job."""
     folder = options["job"].resolve()
     work: Steps[Path | list[Path]]
+    unnamed = {scene.name for scene in bpy.data.scenes if scene_id.of(scene) is None}
     if verb == "gather":
         work = gather(folder, batch)
     else:
@@ -234,6 +241,9 @@ def _of_a_farm(verb: str, options: dict[str, Any], report: Report, batch: Batch)
     for path in made if isinstance(made, list) else [made]:
         # render managers look for this line
         print(f"Saved: '{path}'", flush=True)
+    named = {scene.name for scene in bpy.data.scenes if scene_id.of(scene)}
+    if verb == "gather" and isinstance(made, list) and unnamed & named:
+        _say_unsaved(verb, made[0].parent)
 
 
 def _status(options: dict[str, Any]) -> int:
