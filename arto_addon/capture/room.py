@@ -16,7 +16,7 @@ from ...core.units import clock, size
 SHARE = 1 / 6
 # They may also take at most this share of the free memory: the scene needs memory too, twice.
 FREE_SHARE = 1 / 2
-LEAST_MEGABYTES = 512
+LEAST_MEGABYTES, SMALLEST_MEGABYTES = 512, 64
 # Measured bytes for a pixel (`python -m bench speed`): for a layer on disk; for a light group in
 # the buffers of Cycles and Blender; for a patch while fitting; for a fitted tile, its proxies and
 # writing them. The last number is how many layers a render has besides light groups.
@@ -39,8 +39,9 @@ def budget(megabytes: int) -> int:
     total, free = memory()
     share = int(total * SHARE) if free is None else int(min(total * SHARE, free * FREE_SHARE))
     least = LEAST_MEGABYTES << 20
-    # with less than that free, tiles are as small as they must be
-    return max(least if free is None else min(least, int(free * FREE_SHARE)), share)
+    if free is not None:  # with less than that free, tiles are as small as they must be
+        least = min(least, max(SMALLEST_MEGABYTES << 20, int(free * FREE_SHARE)))
+    return max(least, share)
 
 
 def bytes_a_pixel(passes: int, patches: int, fitted: bool) -> int:

@@ -191,6 +191,11 @@ def test_the_budget_is_a_share_of_the_machine(monkeypatch):
     assert room.budget(0) == max(512 << 20, whole // 16)
     monkeypatch.setattr(room, "memory", lambda: (whole, None))
     assert room.budget(0) == max(512 << 20, int(whole / 6))
+    # of a container with less than that: half of what is free, of a full one the smallest
+    monkeypatch.setattr(room, "memory", lambda: (900 << 20, 600 << 20))
+    assert room.budget(0) == 300 << 20
+    monkeypatch.setattr(room, "memory", lambda: (900 << 20, 0))
+    assert room.budget(0) == 64 << 20
 
 
 def test_too_little_memory_is_seen_before_the_first_render(tmp_path, monkeypatch):
