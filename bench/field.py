@@ -25,7 +25,7 @@ from arto.core.capture.head import CaptureHead
 from arto.core.errors import ArtoError
 
 from . import reference, worlds
-from .behind_cases import CASES
+from .field_worlds import CASES
 
 SIZE = (64, 48)
 SAMPLES, MANY = 128, 384

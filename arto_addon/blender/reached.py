@@ -6,40 +6,53 @@ What is muted, not linked, or mixed in by a factor of 0 shows nothing, so nothin
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import bpy
 
 from .nodes import shader_tree
 
-# A socket and the group nodes around its tree, the outermost first: a group may be used twice.
-_Place = tuple[bpy.types.NodeSocket, tuple[bpy.types.Node, ...]]
+# The group nodes around a tree, the outermost first: a group may be used twice.
+Around = tuple[bpy.types.Node, ...]
+_Place = tuple[bpy.types.NodeSocket, Around]
 _GROUP = "ShaderNodeGroup"
 
 
 def reached(block: bpy.types.ID) -> list[bpy.types.Node]:
     """The nodes that lead to the output of a world or a material in Cycles, groups included."""
+    return list({node.as_pointer(): node for node, _ in reached_places(block)}.values())
+
+
+def reached_places(block: bpy.types.ID) -> list[tuple[bpy.types.Node, Around]]:
+    """`reached`, each node with the group nodes around it, and once for each way of groups."""
     tree = shader_tree(block)
     out = tree.get_output_node("CYCLES") if tree else None
-    return reached_from(out.inputs) if out else []
+    return above(out, ()) if out else []
 
 
-def reached_from(sockets: Any) -> list[bpy.types.Node]:
-    """The nodes that lead to some sockets of a tree that is in no group, groups included."""
-    found: dict[int, bpy.types.Node] = {}
-    seen: set[tuple[int, tuple[int, ...]]] = set()
-    todo: list[_Place] = [(socket, ()) for socket in sockets]
+def above(
+    node: bpy.types.Node, around: Around, ends: frozenset[str] = frozenset()
+) -> list[tuple[bpy.types.Node, Around]]:
+    """The nodes that lead to a node, each with the group nodes around it.
+
+    around: the group nodes around the node; ends: kinds of nodes at which the search stops.
+    """
+    found: dict[tuple[int, ...], tuple[bpy.types.Node, Around]] = {}
+    seen: set[tuple[int, ...]] = set()
+    todo: list[_Place] = _weighed(node, [*node.inputs], around)
     while todo:
-        socket, around = todo.pop()
-        key = socket.as_pointer(), tuple(node.as_pointer() for node in around)
+        socket, outside = todo.pop()
+        key = socket.as_pointer(), *(n.as_pointer() for n in outside)
         if key in seen:
             continue
         seen.add(key)
-        for source, outside in _sources(socket, around):
-            node = source.node
-            if not node.mute and node.bl_idname not in {_GROUP, "NodeGroupInput"}:
-                found[node.as_pointer()] = node
-            todo += _asked(source, outside)
+        for source, inside in _sources(socket, outside):
+            one = source.node
+            if one.mute or one.bl_idname in {_GROUP, "NodeGroupInput"}:
+                todo += _asked(source, inside)
+                continue
+            found[one.as_pointer(), *(n.as_pointer() for n in inside)] = one, inside
+            if one.bl_idname not in ends:
+                todo += _asked(source, inside)
     return list(found.values())
 
 
@@ -48,16 +61,14 @@ def gives(node: bpy.types.Node) -> list[str]:
     return [socket.name for socket in node.outputs if socket.is_linked]
 
 
-def _sources(
-    socket: bpy.types.NodeSocket, around: tuple[bpy.types.Node, ...]
-) -> Iterator[tuple[bpy.types.NodeSocket, tuple[bpy.types.Node, ...]]]:
+def _sources(socket: bpy.types.NodeSocket, around: Around) -> Iterator[_Place]:
     """The outputs that a socket gets its value from; none where the value is its own."""
     for link in socket.links:
         if not link.is_muted and link.is_valid:
             yield link.from_socket, around
 
 
-def _asked(source: bpy.types.NodeSocket, around: tuple[bpy.types.Node, ...]) -> list[_Place]:
+def _asked(source: bpy.types.NodeSocket, around: Around) -> list[_Place]:
     """The sockets that an output depends on."""
     node = source.node
     if node.mute:
@@ -83,43 +94,60 @@ def _asked(source: bpy.types.NodeSocket, around: tuple[bpy.types.Node, ...]) -> 
     if pair is None:  # The end of a zone asks what its beginning is given.
         begins = [n for n in node.id_data.nodes if getattr(n, "paired_output_node", None) == node]
         sockets += [socket for begin in begins for socket in begin.inputs]
-    return [(socket, around) for socket in _weighed(node, sockets, around)]
+    return _weighed(node, sockets, around)
 
 
 def _weighed(
-    node: bpy.types.Node, sockets: list[bpy.types.NodeSocket], around: tuple[bpy.types.Node, ...]
-) -> list[bpy.types.NodeSocket]:
+    node: bpy.types.Node, sockets: list[bpy.types.NodeSocket], around: Around
+) -> list[_Place]:
     """The inputs of a node that count: not those that its factor of 0 or 1 leaves out."""
-    sockets = [socket for socket in sockets if socket.enabled]
+    counted = [(socket, around) for socket in sockets if socket.enabled]
     kind = node.bl_idname
     if kind in {"ShaderNodeBackground", "ShaderNodeEmission"}:
         strength = node.inputs["Strength"]
-        return [strength] if value_of(strength, around) == 0 else sockets
+        return [(strength, around)] if value_of(strength, around) == 0 else counted
     mixes = kind == "ShaderNodeMixShader" or (
         getattr(node, "blend_type", "MIX") == "MIX"
         and kind in {"ShaderNodeMix", "ShaderNodeMixRGB"}
         and getattr(node, "factor_mode", "UNIFORM") == "UNIFORM"
     )
-    if not mixes or len(sockets) != 3:
-        return sockets
-    factor = value_of(sockets[0], around)
+    if not mixes or len(counted) != 3:
+        return counted
+    factor = value_of(*counted[0])
     clamped = kind == "ShaderNodeMixShader" or getattr(node, "clamp_factor", True)
     if factor is None or not (factor in {0.0, 1.0} or clamped):
-        return sockets
+        return counted
     if factor <= 0:
-        return [sockets[0], sockets[1]]
-    return [sockets[0], sockets[2]] if factor >= 1 else sockets
+        return counted[:2]
+    return [counted[0], counted[2]] if factor >= 1 else counted
 
 
-def value_of(socket: bpy.types.NodeSocket, around: tuple[bpy.types.Node, ...] = ()) -> float | None:
-    """The number that a socket has wherever it is asked; None where nodes work it out."""
-    for source, outside in _sources(socket, around):
+def origin(
+    socket: bpy.types.NodeSocket, around: Around = ()
+) -> tuple[bpy.types.NodeSocket | None, Around]:
+    """Where a socket's value comes from, through groups, reroutes and muted nodes.
+
+    -> (the output of the node that makes the value, or the input that holds it; the group nodes
+    around it). (None, ()) where nothing can be told. around: the group nodes around the socket.
+    """
+    while True:
+        found = next(_sources(socket, around), None)
+        if found is None:
+            return socket, around
+        source, around = found
         node = source.node
-        if node.bl_idname == "ShaderNodeValue" and not node.mute:
-            return float(source.default_value)
-        if node.bl_idname in {"NodeReroute", "NodeGroupInput", _GROUP}:
-            asked = _asked(source, outside)
-            return value_of(*asked[0]) if len(asked) == 1 else None
+        if not (node.mute or node.bl_idname in {"NodeReroute", "NodeGroupInput", _GROUP}):
+            return source, around
+        asked = _asked(source, around)
+        if len(asked) != 1:
+            return None, ()
+        socket, around = asked[0]
+
+
+def value_of(socket: bpy.types.NodeSocket, around: Around = ()) -> float | None:
+    """The number that a socket has wherever it is asked; None where nodes work it out."""
+    found, _ = origin(socket, around)
+    if found is None or (found.is_output and found.node.bl_idname != "ShaderNodeValue"):
         return None
-    value = getattr(socket, "default_value", None)
+    value = getattr(found, "default_value", None)
     return float(value) if isinstance(value, int | float) else None

@@ -21,6 +21,7 @@ from ..blender.nodes import Nodes, new_material, shader_tree
 from ..blender.reached import reached
 from ..shot.shot import layer_of
 from ..stage.stage import set_region
+from .brightest import brightest
 from .check import check_images, check_world
 from .detail import detail
 from .still import still
@@ -43,6 +44,10 @@ HOT_SAMPLES = 2**23
 # by 1 / n.
 LEAST_HOT = 256
 BLOCK = 32
+# A world's brightness may have a bound. Where a texel as bright as that has next to none of all
+# light, no texel hides a sun, and few samples tell the light: (a share of the light, samples that
+# are enough up to that share).
+DIM = ((4e-4, 8), (4e-3, 32))
 LEAST_WIDTH = 1024
 
 
@@ -179,6 +184,23 @@ def rough(scene: bpy.types.Scene, width: int, world: bpy.types.World) -> Environ
         return Environment(np.ascontiguousarray(render_studio(studio)[..., :3]))
 
 
+def _dim(studio: bpy.types.Scene) -> NDArray[np.float32] | None:
+    """Render a world that has no suns -> (H, W, 3), or None for a world that may have some."""
+    most = brightest(studio.world)
+    if not math.isfinite(most):
+        return None
+    for least, samples in DIM:
+        studio.cycles.samples = samples
+        image = np.ascontiguousarray(render_studio(studio)[..., :3])
+        environment = Environment(image)
+        share = most * environment.row_solid_angles.max() / environment.irradiance().max()
+        if share <= least:
+            return image
+        if share > DIM[-1][0]:
+            break
+    return None
+
+
 def bake(
     scene: bpy.types.Scene,
     width: int,
@@ -188,7 +210,8 @@ def bake(
     """Bake a view layer's world to an equirectangular map, width x width / 2, in the working space.
 
     Each texel is the mean of the light over the texel. The number of samples follows from the
-    detail of the world: a disc of a tenth of a degree keeps its light to 1%.
+    detail of the world: a disc of a tenth of a degree keeps its light to 1%. A world that has no
+    room for a lamp, as clouds, needs few.
     world: the world to bake (default: the view layer's). Raises SceneError where there is no world
     or an image of the world is missing; CancelledError.
     """
@@ -203,6 +226,9 @@ def bake(
         # Persistent data keeps the world's images loaded for all blocks.
         render.use_persistent_data = True
         fineness = finest / width
+        image = _dim(studio) if fineness**2 > DIM[-1][1] else None
+        if image is not None:
+            return Environment(image).coarser(scale)
         studio.cycles.samples = _power_of_two(fineness**2)
         image = np.ascontiguousarray(render_studio(studio)[..., :3])
         blocks = _hot_blocks(image)

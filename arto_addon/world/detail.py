@@ -6,7 +6,7 @@ import math
 
 import bpy
 
-from ..blender.reached import gives, reached
+from ..blender.reached import Around, above, gives, reached_places
 
 # The width of a map in which a lamp of a tenth of a degree is about two texels wide. Nodes that may
 # draw anything count as this fine, and no world counts as finer.
@@ -59,20 +59,6 @@ _VALUES = {
 _TURNED = {"NodeReroute", "ShaderNodeMapping", "ShaderNodeTexCoord", "ShaderNodeVectorRotate"}
 
 
-def _above(node: bpy.types.Node, ends: set[str]) -> set[bpy.types.Node]:
-    """The nodes that lead to a node's inputs; the search stops at nodes of the kinds `ends`."""
-    found: set[bpy.types.Node] = set()
-    todo = [node]
-    while todo:
-        for socket in todo.pop().inputs:
-            for link in socket.links:
-                if link.from_node not in found:
-                    found.add(link.from_node)
-                    if link.from_node.bl_idname not in ends:
-                        todo.append(link.from_node)
-    return found
-
-
 def _is_value(node: bpy.types.Node) -> bool:
     of_layer = node.bl_idname == "ShaderNodeAttribute" and node.attribute_type == "VIEW_LAYER"
     return of_layer or node.bl_idname in _VALUES
@@ -91,15 +77,17 @@ def values_only(node: bpy.types.Node, ends: set[bpy.types.Node]) -> bool:
     return all(_is_value(n) for n in found)
 
 
-def _of_texture(node: bpy.types.Node) -> int:
+def _of_texture(node: bpy.types.Node, around: Around) -> int:
     """The width of a map that is as fine as an environment texture behind its mapping nodes."""
-    above = _above(node, set())
-    if node.projection != "EQUIRECTANGULAR" or any(n.bl_idname not in _TURNED for n in above):
+    before = [n for n, _ in above(node, around)]
+    if node.projection != "EQUIRECTANGULAR":
+        return FINEST
+    if any(n.bl_idname not in _TURNED and not _is_value(n) for n in before):
         return FINEST
     stretch = 1.0
-    for mapping in (n for n in above if n.bl_idname == "ShaderNodeMapping"):
+    for mapping in (n for n in before if n.bl_idname == "ShaderNodeMapping"):
         scale = [abs(x) for x in mapping.inputs["Scale"].default_value]
-        moved = any(s.is_linked for s in mapping.inputs if s.name != "Vector") or any(
+        moved = any(s.is_linked for s in mapping.inputs if s.name in {"Location", "Scale"}) or any(
             mapping.inputs["Location"].default_value if "Location" in mapping.inputs else ()
         )
         if moved or min(scale) == 0:
@@ -115,13 +103,13 @@ def detail(world: bpy.types.World) -> int:
     a direction may draw anything, so it counts as `FINEST`.
     """
     widest = 1
-    textures = {"ShaderNodeTexEnvironment", "ShaderNodeTexSky"}
-    for node in reached(world):
+    textures = frozenset({"ShaderNodeTexEnvironment", "ShaderNodeTexSky"})
+    for node, around in reached_places(world):
         kind = node.bl_idname
         if node.outputs and not gives(node):
             continue
         if kind == "ShaderNodeTexEnvironment":
-            widest = max(widest, _of_texture(node))
+            widest = max(widest, _of_texture(node, around))
         elif kind == "ShaderNodeTexSky":
             # Two texels across the sun.
             sun = math.degrees(node.sun_size) if node.sun_disc else 1.0
@@ -129,7 +117,8 @@ def detail(world: bpy.types.World) -> int:
         elif kind in _STRUCTURE:
             continue
         elif not _is_value(node) or any(
-            not _is_value(n) and n.bl_idname not in textures for n in _above(node, textures)
+            not _is_value(n) and n.bl_idname not in textures
+            for n, _ in above(node, around, textures)
         ):
             return FINEST
     return min(widest, FINEST)

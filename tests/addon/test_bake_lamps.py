@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from arto.arto_addon.blender.nodes import Nodes
 from arto.arto_addon.world.bake import bake
+from arto.arto_addon.world.brightest import brightest
 from arto.arto_addon.world.detail import FINEST, detail
 from arto.core.light.environment import Environment, directions
 from scene_tools import hdri, set_colour, smooth
@@ -107,3 +108,27 @@ def test_detail_is_read_from_the_nodes(scene):
     assert detail(scene.world) < 1500  # leads nowhere
     tree.links.new(voronoi.outputs["Color"], tree.nodes["Background"].inputs["Color"])
     assert detail(scene.world) == FINEST
+
+
+def test_clouds_have_no_room_for_a_sun(scene):
+    """The bound of a world's brightness holds, and there is none where nodes may draw a sun."""
+    tree = scene.world.node_tree
+    light = tree.nodes["Background"]
+    noise, ramp = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeValToRGB")
+    ramp.color_ramp.elements[1].color = (3, 2, 1, 1)
+    tree.links.new(noise.outputs[0], ramp.inputs[0])
+    tree.links.new(ramp.outputs[0], light.inputs["Color"])
+    light.inputs["Strength"].default_value = 0.5
+    assert brightest(scene.world) == 1.5
+    seen = bake(scene, 64).image
+    assert 0.1 < seen.max() <= 1.5 + 1e-5
+    scale = tree.nodes.new("ShaderNodeMath")
+    scale.operation, scale.inputs[1].default_value = "MULTIPLY_ADD", 4.0
+    tree.links.new(noise.outputs[0], scale.inputs[0])
+    tree.links.new(scale.outputs[0], light.inputs["Strength"])
+    assert brightest(scene.world) == 3 * 4.5
+    scale.operation = "DIVIDE"
+    scale.inputs[1].default_value = 1e-5
+    assert brightest(scene.world) == pytest.approx(3e5)
+    scale.operation = "TANGENT"
+    assert brightest(scene.world) == math.inf
