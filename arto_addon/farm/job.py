@@ -18,6 +18,7 @@ from ...core.capture.head import CaptureHead
 from ...core.capture.kinds import Quality, Take
 from ...core.errors import FarmError
 from ..blender import scripts
+from ..blender.front import to_front
 from ..capture import room
 from ..capture.capture import plan_of
 from ..capture.room import Estimate
@@ -124,6 +125,7 @@ class Job:
                 f"there is no scene '{self.head.scene}' with a view layer '{layer}' in this file: "
                 f"open the one that was planned, {self.head.blend}"
             )
+        to_front(scene)
         before = settings_of(scene)
         with frame_kept(scene):
             try:

@@ -23,6 +23,7 @@ from ...core import marked
 from ...core.errors import ArtoError, CancelledError, SceneError
 from ..blender import devices, scripts
 from ..blender.compositing import places_of_groups
+from ..blender.front import to_front
 from ..shot import home
 from ..work import STOPPED, Progress, Render, Steps, run
 from .snapshot import put_pixels
@@ -74,6 +75,7 @@ def _steps(task: Task, folder: Path) -> Steps[Path | None]:
     scene = home.of_library(bpy.data.scenes, task.scene, task.library)
     if scene is None:
         raise SceneError(f"there is no scene '{task.scene}'")
+    to_front(scene)
     if task.scripts and task.view_layer in scene.view_layers:
         scene.view_layers[task.view_layer].update()
         scripts.check_drivers()

@@ -18,6 +18,7 @@ import bpy
 
 from ...core.errors import ArtoError, SceneError
 from ...core.files import write_text
+from ..blender.front import to_front
 from ..capture.capture import capture, estimate
 from ..capture.sequence import capture_frames
 from ..farm.gather import gather
@@ -157,6 +158,7 @@ def _scene(options: dict[str, Any]) -> tuple[bpy.types.Scene, str]:
             layer = bpy.context.view_layer.name
     elif layer not in scene.view_layers:
         raise OptionError(f"the scene has no view layer '{layer}'")
+    to_front(scene)
     for path in ("folder", "output", "cryptomatte"):
         given = options.get(path)
         if given and not given.startswith("//"):

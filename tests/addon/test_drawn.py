@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+from arto.arto_addon.blender.front import to_front
 from arto.arto_addon.blender.markers import camera_of
 from arto.arto_addon.capture import planes
 from arto.arto_addon.capture.check import check_scene
@@ -108,3 +109,19 @@ def test_what_is_dark_is_dark_by_the_films_exposure():
     dim = light / 20_000
     assert agreement(dim[0], dim[1:]).dark
     assert not agreement(dim[0], dim[1:], white=1 / 20_000).dark
+
+
+def test_a_scene_in_no_window_is_brought_to_its_frame(scene, tmp_path):
+    """A keyed camera is where its frame has it, in a file that was saved in another scene."""
+    camera = scene.camera
+    for frame, x in ((1, 0.0), (11, 10.0)):
+        camera.location.x = x
+        camera.keyframe_insert("location", frame=frame)
+    scene.frame_set(6)
+    name = scene.name
+    bpy.context.window.scene = bpy.data.scenes.new("Other")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "two.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "two.blend"))
+    scene = bpy.data.scenes[name]
+    to_front(scene)
+    assert shot_of(scene).camera_matrix[3] == pytest.approx(5.0)

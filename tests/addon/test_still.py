@@ -8,6 +8,7 @@ import pytest
 from arto.arto_addon.blender.output import float_exr
 from arto.arto_addon.blender.reached import reached
 from arto.arto_addon.capture.check import check_scene
+from arto.arto_addon.live import maps
 from arto.arto_addon.stage.settings import prepare
 from arto.arto_addon.stage.stage import stage
 from arto.arto_addon.world import images, kept
@@ -276,3 +277,19 @@ def test_a_sequence_shows_the_image_of_its_frame(scene, tmp_path):
     user.frame_offset = 2
     with pytest.raises(SceneError, match="without a file for frame 1"):
         check_world(scene)
+
+
+def test_live_writes_a_world_that_stands_still(scene, tmp_path):
+    """Another Blender makes its map, and has neither the scene nor its properties."""
+    scene["sky"] = 0.6
+    node = scene.world.node_tree.nodes.new("ShaderNodeAttribute")
+    node.attribute_type, node.attribute_name = "VIEW_LAYER", "sky"
+    background = scene.world.node_tree.nodes["Background"]
+    scene.world.node_tree.links.new(node.outputs["Fac"], background.inputs["Strength"])
+    blend = tmp_path / "world.blend"
+    name = maps._write(scene, scene.view_layers[0].name, scene.world, blend)
+    with bpy.data.libraries.load(str(blend)) as (there, into):
+        assert not there.scenes and not there.objects
+        into.worlds = [name]
+    strength = into.worlds[0].node_tree.nodes["Background"].inputs["Strength"]
+    assert strength.links[0].from_node.outputs[0].default_value == pytest.approx(0.6)
