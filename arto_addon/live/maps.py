@@ -216,6 +216,7 @@ class Maps:
                 self._process.wait(_REAP)
             except subprocess.TimeoutExpired:
                 self._process.kill()
+                self._process.wait()
         marked.remove_quietly(self._folder, "maps", self._folder.parent)
 
 

@@ -27,7 +27,7 @@ from ..shot.shot import check_same_shot, layer_of
 from ..work import Progress, Steps, Warned
 from ..world import kept
 from ..world.background import background, background_with_holes, holds_out, without_holes
-from ..world.check import check_world, differs_by_rays
+from ..world.check import check_given, check_world, differs_by_rays
 from ..world.lamp_render import brightness, lamp_light, lamp_samples
 from ..world.own import own_of
 from . import ahead, files, light_key
@@ -95,6 +95,7 @@ def make_ready(shown: Shown, lit: Light) -> Steps[Ready]:
     scene, layer, field = shown.scene, shown.layer, shown.field
     settings = scene.arto
     world = lit.world or check_world(scene, layer)
+    check_given(scene, world)
     laps = Laps()
     changed, by_rays = shown.changed(), differs_by_rays(world)
     # raise before the long work what would be raised after it

@@ -117,4 +117,13 @@ def looks_otherwise(scene: bpy.types.Scene) -> list[str]:
         value = scene.path_resolve(change.setting)
         if change.look and value != change.to:
             found.append(change.look.format(f"{value:g}" if isinstance(value, float) else value))
+    if scene.render.use_stamp:
+        found.append("Your render burns metadata into the picture; the relit picture does not")
+    if scene.render.use_sequencer and _has_strips(scene):
+        found.append("Your render shows the sequencer; the relit picture shows the scene")
     return found
+
+
+def _has_strips(scene: bpy.types.Scene) -> bool:
+    editor = scene.sequence_editor
+    return any(s.type != "SOUND" and not s.mute for s in (editor.strips_all if editor else ()))

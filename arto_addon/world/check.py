@@ -43,6 +43,15 @@ def check_world(scene: bpy.types.Scene, view_layer: str | None = None) -> bpy.ty
             f"the view layer '{layer.name}' has Environment off, so that no world lights it: turn "
             "it on (View Layer properties, Filter)"
         )
+    check_given(scene, world)
+    return world
+
+
+def check_given(scene: bpy.types.Scene, world: bpy.types.World) -> None:
+    """Check a world that a scene is shown in, whether it is the scene's own or a look's.
+
+    Raises SceneError for a world whose light no map has, or where an image of it is missing.
+    """
     check_light_of(scene, world)
     for node in image_nodes(world):
         if node.image is None:
@@ -60,7 +69,6 @@ def check_world(scene: bpy.types.Scene, view_layer: str | None = None) -> bpy.ty
                 f"the world's image '{node.image.name}' is missing on disk ({path}): find it "
                 "again (File, External Data, Find Missing Files), or choose another"
             )
-    return world
 
 
 def check_images(world: bpy.types.World, frame: int) -> None:

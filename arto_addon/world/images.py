@@ -59,7 +59,8 @@ def stamps(world: bpy.types.World, frame: int) -> list[object]:
             for path in files_at(node, frame):
                 try:
                     s = path.stat()
-                    found.append((str(path), s.st_size, s.st_mtime_ns, s.st_ctime_ns, s.st_ino))
+                    # The name alone: a job's copy of the file leads there by another way.
+                    found.append((path.name, s.st_size, s.st_mtime_ns, s.st_ctime_ns, s.st_ino))
                 except OSError as e:  # The file cannot be read, and the stamp says so.
-                    found.append((str(path), type(e).__name__))
+                    found.append((path.name, type(e).__name__))
     return found

@@ -197,8 +197,12 @@ def bare(
         for layer in list(copy.view_layers):
             if layer.name != view_layer:
                 copy.view_layers.remove(layer)
-        # Its own world stays, as Attribute nodes and drivers may read that world's properties.
-        copy.view_layers[0].world_override = world
+        # Where the layer has a world of its own, Attribute nodes and drivers read the properties of
+        # the scene's world nevertheless.
+        if copy.view_layers[0].world_override:
+            copy.view_layers[0].world_override = world
+        elif world:
+            copy.world = world
         copy.background_set = None
         root = copy.collection
         for child in list(root.children):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import arto
+from arto.arto_addon.blender.version import FIVE
 from arto.arto_addon.stage.settings import CHANGES, looks_otherwise
 from scene_tools import captured, small_scene
 
@@ -35,3 +36,13 @@ def test_lines_for_settings_that_look_otherwise(tmp_path):
         "Your render clamps direct light at 2.5; the relit picture does not",
         "Your render uses Fast GI; the relit picture has all its bounces",
     ]
+    strips = scene.sequence_editor_create().strips
+    scene.render.use_stamp = True
+    assert looks_otherwise(scene)[2:] == [
+        "Your render burns metadata into the picture; the relit picture does not"
+    ]
+    length = {"length" if FIVE else "frame_end": 10}
+    strip = strips.new_effect(name="A", type="COLOR", channel=1, frame_start=1, **length)
+    assert "shows the sequencer" in looks_otherwise(scene)[3]
+    strip.mute = True
+    assert len(looks_otherwise(scene)) == 3

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+from arto.arto_addon.blender.nodes import new_world
 from arto.arto_addon.blender.output import float_exr
 from arto.arto_addon.blender.reached import reached
 from arto.arto_addon.capture.check import check_scene
@@ -12,7 +13,7 @@ from arto.arto_addon.live import maps
 from arto.arto_addon.stage.settings import prepare
 from arto.arto_addon.stage.stage import stage
 from arto.arto_addon.world import images, kept
-from arto.arto_addon.world.check import check_world
+from arto.arto_addon.world.check import check_given, check_world
 from arto.arto_addon.world.still import still
 from arto.arto_addon.world.studio import render
 from arto.core import exr
@@ -176,6 +177,13 @@ def test_a_world_whose_light_ends_is_refused(scene):
         check_scene(scene)
     scene.world.cycles.max_bounces += 1
     check_scene(scene)
+
+
+def test_a_look_is_checked_as_the_scenes_world(scene):
+    look = new_world("Look")
+    look.cycles.max_bounces = 0
+    with pytest.raises(SceneError, match="ends after 0 bounces"):
+        check_given(scene, look)
 
 
 def test_materials_find_the_worlds_properties_on_the_stage(scene):
