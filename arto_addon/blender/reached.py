@@ -63,7 +63,8 @@ def gives(node: bpy.types.Node) -> list[str]:
 
 def _sources(socket: bpy.types.NodeSocket, around: Around) -> Iterator[_Place]:
     """The outputs that a socket gets its value from; none where the value is its own."""
-    for link in socket.links:
+    # Blender looks at all links of a tree to list those of a socket.
+    for link in socket.links if socket.is_linked else ():
         if not link.is_muted and link.is_valid:
             yield link.from_socket, around
 
@@ -90,8 +91,7 @@ def _asked(source: bpy.types.NodeSocket, around: Around) -> list[_Place]:
             if socket.identifier == source.identifier
         ]
     sockets = [*node.inputs]
-    pair = getattr(node, "paired_output_node", None)
-    if pair is None:  # The end of a zone asks what its beginning is given.
+    if node.bl_idname.endswith("Output"):  # The end of a zone asks what its beginning is given.
         begins = [n for n in node.id_data.nodes if getattr(n, "paired_output_node", None) == node]
         sockets += [socket for begin in begins for socket in begin.inputs]
     return _weighed(node, sockets, around)

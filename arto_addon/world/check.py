@@ -12,6 +12,7 @@ from ...core.errors import ArtoError, SceneError
 from ..blender.nodes import shader_tree
 from ..blender.reached import gives, reached
 from ..shot.shot import layer_of
+from .detail import detail
 from .images import files_at, image_nodes
 from .still import check_pixels
 
@@ -134,7 +135,9 @@ def check_light_of(scene: bpy.types.Scene, world: bpy.types.World) -> None:
     check_no_volume(world)
     check_pixels(scene, world)
     bounces = world.cycles.max_bounces
-    if bounces < scene.cycles.max_bounces and world.cycles.sampling_method != "NONE":
+    # Cycles keeps to it where it samples the world as a light: one of an even colour it does not.
+    sampled = world.cycles.sampling_method != "NONE" and detail(world) > 1
+    if bounces < scene.cycles.max_bounces and sampled:
         raise SceneError(
             f"the world's light ends after {bounces} bounces (World properties, Settings, Max "
             f"Bounces), which only a render can do: raise it to {scene.cycles.max_bounces}, the "

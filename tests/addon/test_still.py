@@ -18,6 +18,7 @@ from arto.arto_addon.world.still import still
 from arto.arto_addon.world.studio import render
 from arto.core import exr
 from arto.core.errors import SceneError
+from scene_tools import hdri, smooth
 
 
 def _show(world, socket):
@@ -171,6 +172,8 @@ def test_a_world_drawn_by_the_pixel_of_a_panorama_is_refused(scene):
 
 def test_a_world_whose_light_ends_is_refused(scene):
     scene.world.cycles.max_bounces = scene.cycles.max_bounces - 1
+    check_world(scene)  # an even colour is not sampled as a light
+    hdri(scene, smooth(8))
     with pytest.raises(SceneError, match="ends after 11 bounces"):
         check_world(scene)
     with pytest.raises(SceneError, match="ends after 11 bounces"):
@@ -182,6 +185,9 @@ def test_a_world_whose_light_ends_is_refused(scene):
 def test_a_look_is_checked_as_the_scenes_world(scene):
     look = new_world("Look")
     look.cycles.max_bounces = 0
+    scene.world, own = look, scene.world
+    hdri(scene, smooth(8))
+    scene.world = own
     with pytest.raises(SceneError, match="ends after 0 bounces"):
         check_given(scene, look)
 
