@@ -9,10 +9,10 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.catcher import catch_seen, of_ground
+from ...core.catcher import Caught, catch_seen, of_ground
 from ...core.errors import FieldError
 from ...core.field.field import Field
-from ...core.field.through import opaque
+from ...core.field.through import ROUNDED, opaque
 from ...core.light.environment import Environment
 from ...core.light.lamps import Split
 from ...core.light.light import PatchLight
@@ -182,7 +182,7 @@ def finish(
     things = picture[..., :3].copy()
     if not scene.render.film_transparent:
         yield Progress(0.8, "adding the world behind")
-        _behind(shown, lit, picture, ready.found.share > LEAST_SHARE)
+        _behind(shown, lit, picture, ready.found.share > LEAST_SHARE, caught)
         lap("background")
         check_finite(picture, f"the world '{ready.world.name}' behind the scene")
     check_finite(picture, "the sum of the picture's parts")
@@ -283,25 +283,34 @@ def _hold(
     picture[..., :3] *= np.divide(expected, found, out=np.ones(3), where=found > 0)
 
 
-def _behind(shown: Shown, lit: Light, picture: NDArray[np.float32], has_lamps: bool) -> None:
-    """Add the world as the camera sees it behind everything."""
+def _behind(
+    shown: Shown,
+    lit: Light,
+    picture: NDArray[np.float32],
+    has_lamps: bool,
+    caught: Caught | None,
+) -> None:
+    """Add the world as the camera sees it behind everything. caught: with shadow catchers."""
     scene, layer, field = shown.scene, shown.layer, shown.field
     captured = field.region
     through = field.through()
     holes = holds_out(scene, layer)
     # captures of before did not look through the holes
     unknown = holes and through is None and not field.about.behind
-    if len(shown.takes) > 1:
-        if holes:
-            # the world behind shows through the shadows, but not in the holes
-            solid = _solid(field, through)
-            if unknown:
-                solid = without_holes(scene, captured, layer, lit.world)
-            there = background(scene, captured, layer, has_lamps, lit.world)
-            seen = np.clip(solid - picture[..., 3], 0, 1)
-            picture[..., :3] += seen[..., None] * there
-            picture[..., 3] = solid
-            return
+    tint = _tint(through)
+    if caught and (holes or tint is not None):
+        # the world behind shows through the shadows, but not in the holes
+        solid = _solid(field, through)
+        if unknown:
+            solid = without_holes(scene, captured, layer, lit.world)
+        there = background(scene, captured, layer, has_lamps, lit.world)
+        seen = (solid - picture[..., 3])[..., None]
+        if tint is not None:
+            seen = caught.share - (1 - solid)[..., None] + tint
+        picture[..., :3] += np.clip(seen, 0, 1) * there
+        picture[..., 3] = solid
+        return
+    if caught:
         through = None  # the shadows are in the alpha of the plate
     elif unknown:
         behind = background_with_holes(scene, captured, layer, lit.world)
@@ -316,6 +325,14 @@ def _behind(shown: Shown, lit: Light, picture: NDArray[np.float32], has_lamps: b
         seen = Region.around(rows + captured.y, columns + captured.x)
         there = background(scene, seen, layer, has_lamps, lit.world)[captured.slices]
         picture[captured.slices] = over(inside, there, through)
+
+
+def _tint(through: NDArray[np.float32] | None) -> NDArray[np.float32] | None:
+    """By how much more the world is seen in a channel than in all -> (H, W, 3); None where not."""
+    if through is None:
+        return None
+    tint = through - through.mean(axis=-1, keepdims=True)
+    return tint if np.abs(tint).max(initial=0) > ROUNDED else None
 
 
 def _solid(field: Field, through: NDArray[np.float32] | None) -> NDArray[np.float32]:
