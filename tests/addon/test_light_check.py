@@ -8,7 +8,7 @@ import pytest
 from arto.arto_addon import work
 from arto.arto_addon.blender.nodes import new_material
 from arto.arto_addon.capture import planes
-from arto.arto_addon.capture.light_check import check_light
+from arto.arto_addon.capture.light_check import _words, check_light
 from arto.arto_addon.fit import fit
 from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import status
@@ -16,6 +16,7 @@ from arto.arto_addon.stage.bounds import scene_bounds
 from arto.arto_addon.stage.settings import prepare
 from arto.arto_addon.stage.stage import stage
 from arto.core import exr
+from arto.core.capture.agreement import Agreement
 from scene_tools import BOX, add_mesh, captured, cycles, material, small_scene, snapshot
 
 from bench import scenes, worlds
@@ -148,3 +149,19 @@ def test_a_warning_is_kept_with_the_capture_and_shown(tmp_path):
     text, serves = status.caution_line(scene) or ("", True)
     assert "lets shadow rays through" in text and not serves
     assert status.caution_line(small_scene(tmp_path / "other")) is None
+
+
+def test_the_cause_that_is_named_is_in_the_scene(tmp_path):
+    scene = small_scene(tmp_path)
+    brighter = Agreement(1.1, 1.24, 0.08, False)
+    with stage(scene, scene.view_layers[0].name) as on:
+        prepare(on, layers=3)
+        assert "more than 8 transparent surfaces" in _words(on, brighter, deep=True)
+        assert "a material or a setting" in _words(on, brighter)
+        if hasattr(bpy.types, "ShaderNodeRaycast"):
+            tree = scene.objects["Floor"].data.materials[0].node_tree
+            node = tree.nodes.new("ShaderNodeRaycast")
+            assert "a material or a setting" in _words(on, brighter)  # it leads nowhere
+            shader = tree.nodes["Principled BSDF"]
+            tree.links.new(node.outputs["Is Hit"], shader.inputs["Base Color"])
+            assert "'Floor' looks around (node Raycast)" in _words(on, brighter)
