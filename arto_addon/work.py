@@ -19,7 +19,7 @@ import bpy
 from ..core.errors import ArtoError, CancelledError, SceneError, StrictError
 from . import interrupt
 
-STOPPED = "cancelled: finished tiles are kept, run it again to go on"
+STOPPED = "cancelled: finished parts of a capture are kept, run it again to go on"
 
 
 @dataclass

@@ -43,8 +43,9 @@ OLD = ".old"
 FORMAT = "ARTO folder"
 VERSION = 1
 # capture: a capture set; field: a reflectance field; tile: a tile of one; take: a take of a shot;
-# job: what the window gives a second Blender; part: a part of a farm's job; maps: what Live needs.
-Kind = Literal["capture", "field", "tile", "take", "job", "part", "maps"]
+# job: what the window gives a second Blender; part: a part of a farm's job; temporary: what is
+# needed for a moment only, in the machine's folder for that.
+Kind = Literal["capture", "field", "tile", "take", "job", "part", "temporary"]
 
 # No mark is longer.
 _MOST = 1 << 16

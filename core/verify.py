@@ -26,6 +26,8 @@ SIDE = 8
 CHANCE = 3.0
 # A relative difference that nobody sees.
 TELLING = 0.02
+# How many times the difference that noise makes still counts as noise.
+NEARLY = 1.2
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class Verdict:
     error : float
         The mean relative difference over squares, noise included.
     noise : float
-        The part of `error` that noise alone would cause.
+        The part of `error` that noise alone would cause, the picture's own included.
     share : float
         The share of squares that differ by more than chance, 0 to 1.
     off : (H, W) float32
@@ -52,9 +54,14 @@ class Verdict:
     @property
     def line(self) -> str:
         """The result in words."""
-        if self.share < 0.01:
-            return f"Agrees with a render within its noise ({self.noise:.1%})"
-        return f"Differs by more than noise in {self.share:.0%} of the picture"
+        on_the_mean = (
+            f"by {self.error:.1%} on the mean, of which noise alone makes {self.noise:.1%}"
+        )
+        if self.share >= 0.01:
+            return f"Differs by more than noise in {self.share:.0%} of the picture: {on_the_mean}"
+        if self.error <= NEARLY * self.noise:
+            return f"Agrees with a render within noise: it differs {on_the_mean}"
+        return f"Agrees with a render nearly: it differs {on_the_mean}"
 
 
 def verify(
@@ -96,7 +103,7 @@ def verify(
     h, w = truth.shape[:2]
     off = np.repeat(np.repeat(beyond, side, 0), side, 1)[:h, :w].astype(np.float32)
     # the mean absolute value of normal noise is sqrt(2 / pi) times its deviation
-    noise = float((deviation / (mean + floor)).mean() * np.sqrt(2 / np.pi))
+    noise = float((deviation / (mean + floor)).mean() * np.sqrt(2 / np.pi * (1 + own)))
     return Verdict(float(relative.mean()), noise, float((beyond > TELLING).mean()), off)
 
 

@@ -11,16 +11,6 @@ from tools import package
 
 ROOT = Path(package.ROOT)
 WIDTH, HEIGHT = 64, 48
-# A display of its own, on which a true ESC is pressed once $ESCAPE is a file: what stops a render
-# is the keyboard itself, Blender's simulated events do not.
-DISPLAY = """
-(until [ -e "$ESCAPE" ]; do sleep 0.1; done; xdotool key Escape) >/dev/null 2>&1 &
-"$@"
-code=$?
-kill $!
-exit $code
-"""
-
 MAKE_SCENE = f"""
 import sys
 sys.path.insert(0, {str(ROOT)!r})
@@ -68,16 +58,12 @@ class Program:
         self.environment = {**os.environ, "BLENDER_USER_RESOURCES": str(home)}
         self.command = shlex.split(os.environ["BLENDER"])
 
-    def run(
-        self, *arguments: str | Path, escape: Path | None = None
-    ) -> subprocess.CompletedProcess[str]:
-        """Run it to its end; with `escape` in its window, and ESC is pressed when that appears."""
+    def run(self, *arguments: str | Path, screen: bool = False) -> subprocess.CompletedProcess[str]:
+        """Run it to its end; screen: in its window, on a display of its own."""
         line = [*self.command, *map(str, arguments)]
         environment = self.environment
-        if escape:
-            screen = ["xvfb-run", "-a", "-s", "-screen 0 1600x900x24"]
-            line = [*screen, "bash", "-c", DISPLAY, "-", *line]
-            environment = {**environment, "ESCAPE": str(escape)}
+        if screen:
+            line = ["xvfb-run", "-a", "-s", "-screen 0 1600x900x24", *line]
         return subprocess.run(
             line, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=300
         )

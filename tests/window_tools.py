@@ -18,6 +18,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from program_tools import ROOT, Program
 
@@ -38,6 +39,10 @@ def region_of(area_type, region_type):
     window = bpy.context.window_manager.windows[0]
     area = next(a for a in window.screen.areas if a.type == area_type)
     return window, area, next(r for r in area.regions if r.type == region_type)
+
+
+def space_of():
+    return region_of("IMAGE_EDITOR", "WINDOW")[1].spaces.active
 
 
 def box(area_type, region_type):
@@ -84,7 +89,8 @@ def watch():
 
 names = {
     "bpy": bpy, "session": session, "status": status, "paths": paths, "at": [0], "box": box,
-    "under": under, "tab": tab, "drawn": drawn, "watch": watch,
+    "under": under, "tab": tab, "drawn": drawn, "watch": watch, "region_of": region_of,
+    "space_of": space_of,
 }
 
 
@@ -203,16 +209,38 @@ class Window:
         for key in keys:
             self._gesture("key", key)
 
-    def button(self, what: str, across: float = 0.45) -> tuple[int, int]:
+    def button(self, what: str, across: float = 0.45, start: int = 5) -> tuple[int, int]:
         """Find a button of the sidebar: the mouse goes down it until the window says that the
-        button under the mouse is `what`: "bpy.ops.arto.shoot()", or "arto.rotation"."""
+        button under the mouse is `what`: "bpy.ops.arto.shoot()", or "arto.rotation". start: how far
+        below the sidebar's top it begins."""
         left, top, width, height = self.get("box('VIEW_3D', 'UI')")
         x = int(left + across * width)
-        for y in range(top + 5, top + height, 8):
+        for y in range(top + start, top + height, 8):
             self.point(x, y)
             if self.get("under('VIEW_3D', 'UI')") == what:
                 return x, y
         raise AssertionError(f"no button {what} in the sidebar\n{self.printed[-3000:]}")
+
+    def seen(self) -> np.ndarray:
+        """The picture that the image editor shows, as it is on the display, (h, w, 3), 0 to 255."""
+        left, top, _, height = self.get("box('IMAGE_EDITOR', 'WINDOW')")
+        corner = "region_of('IMAGE_EDITOR', 'WINDOW')[2].view2d.view_to_region({}, clip=False)"
+        x0, y0 = self.get(corner.format("0, 0"))
+        x1, y1 = self.get(corner.format("1, 1"))
+        # less its outline
+        size = x1 - x0 - 4, y1 - y0 - 4
+        crop = f"{size[0]}x{size[1]}+{left + x0 + 2}+{top + height - y1 + 2}"
+        environment = {**os.environ, "DISPLAY": self.display}
+        line = ["import", "-window", "root", "-crop", crop, "-depth", "8", "rgb:-"]
+        before, until = b"", time.monotonic() + 10
+        while time.monotonic() < until:
+            self.get("None")
+            now = subprocess.run(line, env=environment, check=True, capture_output=True).stdout
+            if now == before:
+                break
+            before = now
+            time.sleep(0.15)  # until what is drawn has come to rest
+        return np.frombuffer(before, np.uint8).reshape(size[1], size[0], 3).astype(float)
 
     def press(self, button: str) -> None:
         """Call one of ARTO's operators as its button does."""
@@ -246,6 +274,19 @@ class Window:
     @property
     def printed(self) -> str:
         return self.log.read_text()
+
+
+def ended(pid: int, seconds: float = 15) -> None:
+    """Wait until a process is gone (or only its entry is left)."""
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        try:
+            if Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] == "Z":
+                return
+        except FileNotFoundError:
+            return
+        time.sleep(0.05)
+    raise AssertionError(f"process {pid} still runs")
 
 
 @contextmanager

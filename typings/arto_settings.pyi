@@ -56,5 +56,6 @@ class Settings:
     active_group: int
     folder: str
     scene_id: str
+    alone: str
     bl_rna: Any
     def is_property_set(self, name: str) -> bool: ...

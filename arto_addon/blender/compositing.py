@@ -6,7 +6,6 @@ scene with a Composite node. Blender 5 also turned some settings of nodes into s
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from ...core import exr
 from ..work import Render, blocking_render
 from .output import float_exr, write_to
+from .scratch import temporary
 from .version import FIVE
 
 # The kind of node that puts out a scene's picture.
@@ -149,8 +149,8 @@ def composited(scene: bpy.types.Scene, text: str) -> NDArray[np.float32]:
     render.use_compositing = True
     render.compositor_device, render.compositor_precision = "CPU", "FULL"
     float_exr(render, multilayer=False)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "composite.exr"
+    with temporary() as folder:
+        path = folder / "composite.exr"
         write_to(render, path)
         request = Render(scene.name, 0, text)
         blocking_render(request)
@@ -167,7 +167,7 @@ def darkroom(name: str) -> Iterator[Darkroom]:
         tree = new_compositor(scene, name)
         if not tree.is_embedded_data:
             made.append(tree)
-        with tempfile.TemporaryDirectory() as folder:
-            yield Darkroom(scene, tree, made, Path(folder))
+        with temporary() as folder:
+            yield Darkroom(scene, tree, made, folder)
     finally:
         bpy.data.batch_remove(made)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
@@ -32,13 +34,33 @@ def _as_new(settings: bpy.types.ImageFormatSettings) -> None:
     new = bpy.data.scenes.new("ARTO Output")
     try:
         there = new.render.image_settings
-        # The allowed values of the other settings depend on these.
-        first = ["media_type", "file_format"] if FIVE else ["file_format"]
-        names = [p.identifier for p in there.bl_rna.properties if not p.is_readonly]
-        for name in first + [n for n in names if n not in first]:
+        for name in _names(there):
             setattr(settings, name, getattr(there, name))
     finally:
         bpy.data.scenes.remove(new)
+
+
+def _names(settings: bpy.types.ImageFormatSettings) -> list[str]:
+    """The names of all format settings, in an order in which they can be set."""
+    # The allowed values of the other settings depend on these.
+    first = ["media_type", "file_format"] if FIVE else ["file_format"]
+    names = [p.identifier for p in settings.bl_rna.properties if not p.is_readonly]
+    return first + [n for n in names if n not in first]
+
+
+@contextmanager
+def borrowed(render: bpy.types.RenderSettings) -> Iterator[None]:
+    """Let an artist's scene write a picture as ARTO needs it, and put all its settings back."""
+    settings = render.image_settings
+    formats = {name: getattr(settings, name) for name in _names(settings)}
+    others = {name: getattr(render, name) for name in _WRITING}
+    try:
+        float_exr(render, multilayer=False)
+        yield
+    finally:
+        for owner, values in ((settings, formats), (render, others)):
+            for name, value in values.items():
+                setattr(owner, name, value)
 
 
 def set_format(settings: bpy.types.ImageFormatSettings, media: str, kind: str) -> None:

@@ -1,4 +1,9 @@
-"""Pictures that are made in memory, as Blender's images without a file."""
+"""Pictures that are made in memory, as Blender's images without a file.
+
+Blender shows an image that it generated without the scene's exposure, look and view transform,
+whatever *View as Render* says. An image with packed data obeys. So each image is packed once, while
+it has a single pixel.
+"""
 
 from __future__ import annotations
 
@@ -8,25 +13,42 @@ from numpy.typing import NDArray
 
 from .colour import working_space
 
+# The custom property that marks an image as one of these.
+_MARK = "arto_picture"
+
 
 def put(name: str, picture: NDArray, display: bool = False) -> bpy.types.Image:
     """Show a picture as Blender's image of a name, which is made where there is none.
 
     picture: (H, W, 4), scene-linear, premultiplied, rows top-down; display: show the numbers as
-    they are, else as a render is shown, with exposure and look.
+    they are, else as a render is shown, with exposure, look and view transform.
     """
     height, width = picture.shape[:2]
     image = bpy.data.images.get(name)
-    if image is not None and (image.source != "GENERATED" or image.library):
+    if image is not None and (image.library or not is_picture(image)):
         bpy.data.images.remove(image)
         image = None
     if image is None:
-        image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=True)
-        image.colorspace_settings.name = working_space()
-        image.alpha_mode = "PREMUL"
+        image = _new(name)
+    if image.use_view_as_render == display:
         image.use_view_as_render = not display
-    elif tuple(image.size) != (width, height):
+    if tuple(image.size) != (width, height):
         image.scale(width, height)
     image.pixels.foreach_set(np.ascontiguousarray(picture[::-1], np.float32).ravel())
     image.update()
+    return image
+
+
+def is_picture(image: bpy.types.Image) -> bool:
+    """Whether an image was made by `put`: it only shows a picture, and nothing renders with it."""
+    return _MARK in image and bool(image.packed_file)
+
+
+def _new(name: str) -> bpy.types.Image:
+    image = bpy.data.images.new(name, 1, 1, alpha=True, float_buffer=True)
+    image.colorspace_settings.name = working_space()
+    image.alpha_mode = "PREMUL"
+    image.pixels.foreach_set(np.zeros(4, np.float32))  # without pixels nothing is packed
+    image.pack()
+    image[_MARK] = True
     return image

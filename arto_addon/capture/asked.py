@@ -53,6 +53,17 @@ def geometry(scene: bpy.types.Scene, seen: Rendered) -> Hemicube:
     return hemicube
 
 
+def key_of_settings(scene: bpy.types.Scene) -> str:
+    """A digest of the settings that decide a capture, quickly: the scene is not looked at."""
+    settings = scene.arto
+    kinds = [Decides.CAPTURE, Decides.CAPTURE_TILES, Decides.CAPTURE_KEPT]
+    kinds += [Decides.CAPTURE_FIT] if settings.keep != Keep.ALWAYS else []
+    hemicube = planes.wanted(scene, (0.0, 0.0, 0.0), 1.0).to_json()
+    of = [values(settings, kind) for kind in kinds]
+    of += [samples_of(scene), settings.patterns, settings.route, settings.grain, hemicube, VERSION]
+    return hashlib.sha256(json.dumps(of, sort_keys=True).encode()).hexdigest()[:16]
+
+
 @dataclass(frozen=True)
 class Asked:
     """A capture that was asked for, on its stage.
@@ -144,18 +155,32 @@ def asked(
 
 
 def begun(
-    this: Asked, folder: Path, given: Given | None, strips: int | None = None, takes: int = 1
+    this: Asked,
+    folder: Path,
+    given: Given | None,
+    strips: int | None = None,
+    takes: int = 1,
+    often: bool = False,
 ) -> Steps[tuple[Planned, CaptureHead]]:
     """Look at the scene and plan the capture -> (`Planned`, the head of its capture set).
 
     The head has no rendered tile yet.
 
     folder: where the set will be; strips: the number of tiles of the picture (default: as many as
-    memory makes necessary); takes: see `planned`. Raises SceneError.
+    memory makes necessary); takes, often: see `planned`. Raises SceneError.
     """
     settings = this.scene.arto
     plan = yield from planned(
-        this.scene, this.on, this.hemicube, this.region, this.grain, folder, given, strips, takes
+        this.scene,
+        this.on,
+        this.hemicube,
+        this.region,
+        this.grain,
+        folder,
+        given,
+        strips,
+        takes,
+        often,
     )
     head = replace(
         this.head,
@@ -163,6 +188,7 @@ def begun(
         tiles=tuple(TileEntry(region) for region in plan.tiles),
         key=this.key,
         patterns=plan.patterns,
+        asked=key_of_settings(this.scene),
         route=plan.route,
         # of sampled lights Cycles leaves out the faint ones
         radiance=None if plan.route == Route.SAMPLED else planes.FAINT,

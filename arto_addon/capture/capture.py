@@ -148,7 +148,8 @@ def _begun(
     this: Asked, folder: Path, given: Given | None = None
 ) -> Steps[tuple[Planned, CaptureHead]]:
     """Plan the first of a shot's takes, and count in what the takes beside it need."""
-    return begun(this, folder, given, takes=1 + len(takes.TAKES) * this.catchers)
+    count = 1 + len(takes.TAKES) * this.catchers
+    return begun(this, folder, given, takes=count, often=True)
 
 
 def _capture_beside(

@@ -14,6 +14,10 @@ from .planes import MOST_SAMPLED
 # Tiles that are not too thin begin at a row that is a multiple of this: there a row of every proxy
 # begins.
 ALIGNED = 8
+# Seconds of rendering after which work is kept; more where Cycles needs long to get ready, so that
+# getting ready takes at most a sixth of the time. Each strip is a file that relighting opens, and a
+# process may open a few hundred.
+KEPT, AT_MOST, MOST_STRIPS = 45.0, 6.0, 60
 
 
 def tiles_of(region: Region, bytes_a_pixel: int, budget: int) -> list[Region]:
@@ -30,6 +34,25 @@ def tiles_of(region: Region, bytes_a_pixel: int, budget: int) -> list[Region]:
         # aligning moves an edge by less than `ALIGNED` rows: leave room for that
         count = -(-region.height // (rows - ALIGNED))
     return strips_of(region, count)
+
+
+def kept_often(tiles: list[Region], region: Region, seconds: float, ready: float) -> list[Region]:
+    """Cut a region into more strips where the work would be kept too seldom.
+
+    tiles: the strips that fit the memory; seconds: that rendering all of them takes; ready: seconds
+    that Cycles needs before the first path of each strip. Work is kept at the end of each strip.
+    """
+    share = max(KEPT, AT_MOST * ready) / max(seconds, 1e-9)
+    rows = max(int(region.height * share) // ALIGNED, 1) * ALIGNED
+    rows = max(rows, -(-region.height // MOST_STRIPS // ALIGNED) * ALIGNED)
+    if share >= 1 or -(-region.height // rows) <= len(tiles):
+        return tiles
+    # all but the first begin at a row where a row of every proxy begins
+    edges = [*range(-(region.y % ALIGNED), region.height, rows), region.height]
+    edges[0] = 0
+    return [
+        Region(region.x, region.y + a, region.width, b - a) for a, b in itertools.pairwise(edges)
+    ]
 
 
 def strips_of(region: Region, count: int) -> list[Region]:

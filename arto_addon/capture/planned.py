@@ -21,12 +21,13 @@ from ...core.patterns import LobedSet, PatternSet
 from ...core.region import Region
 from ...core.units import size
 from ..stage.settings import samples_of
-from ..stage.stage import Stage, picture_region
+from ..stage.stage import Pace, Stage, picture_region
+from ..stage.takes import TAKES
 from ..work import Progress, Steps
 from . import planes, room
 from .light_check import check_light
 from .patterns import patterns_of
-from .plan import render_plan, strips_of, tiles_of
+from .plan import kept_often, render_plan, strips_of, tiles_of
 from .probe import refined
 from .room import Estimate
 
@@ -38,12 +39,14 @@ ADAPTIVE_SHARE = 2
 class Given:
     """What was decided before, for all frames or takes of a shot.
 
-    hemicube: all its patches, refined; route: how light gets to them; caution: see `check_light`.
+    hemicube: all its patches, refined; route: how light gets to them; caution: see `check_light`;
+    pace: how fast the scene renders, where that was measured.
     """
 
     hemicube: Hemicube
     route: Route
     caution: Caution | None
+    pace: Pace | None = None
 
 
 @dataclass(frozen=True)
@@ -70,11 +73,13 @@ def planned(
     given: Given | None,
     strips: int | None = None,
     takes: int = 1,
+    often: bool = False,
 ) -> Steps[Planned]:
     """Look at the scene by small renders and plan a capture -> `Planned`.
 
     strips: the number of tiles of the picture (default: as many as memory makes necessary); takes:
-    how many captures like this are to come. Raises SceneError where there is no room for them.
+    how many captures like this are to come; often: whether to cut more tiles, so that work is kept
+    every minute. Raises SceneError where there is no room for them.
     """
     settings = scene.arto
     if given:
@@ -100,12 +105,14 @@ def planned(
     def estimated(kept: bool) -> tuple[list[Region], Estimate]:
         bytes_a_pixel = room.bytes_a_pixel(max(plan), len(hemicube), not kept)
         tiles = strips_of(region, strips) if strips else tiles_of(region, bytes_a_pixel, budget)
-        seconds = None
-        if on.pace:
-            renders = len(plan) * len(tiles)
-            paths_traced = region.pixels * samples_of(scene) * len(plan)
-            seconds = renders * on.pace.ready + paths_traced * on.pace.path
-            seconds += sum(plan) * len(tiles) * on.pace.layer
+        seconds, pace = None, on.pace or (given.pace if given else None)
+        if pace:
+            tracing = region.pixels * samples_of(scene) * len(plan) * pace.path
+            if often and not strips:
+                ready = len(plan) * pace.ready
+                tiles = kept_often(tiles, region, tracing + len(tiles) * ready, ready)
+            seconds = tracing + len(plan) * len(tiles) * pace.ready
+            seconds += sum(plan) * len(tiles) * pace.layer
         one = room.estimate(plan, tiles, len(hemicube), not kept, seconds)
         return tiles, one.times(takes)
 
@@ -153,14 +160,46 @@ def most(scene: bpy.types.Scene) -> Estimate:
 
     Raises SceneError, HemicubeError, PatternError.
     """
-    settings = scene.arto
     hemicube = planes.wanted(scene, (0.0, 0.0, 0.0), 1.0)
-    patches = len(hemicube) * (ADAPTIVE_SHARE if settings.adaptive else 1)
+    return _of_patches(scene, len(hemicube) * (ADAPTIVE_SHARE if scene.arto.adaptive else 1))
+
+
+def least(scene: bpy.types.Scene) -> Estimate:
+    """What a capture takes at least, without a look at the scene. Raises what `most` raises."""
+    hemicube = planes.wanted(scene, (0.0, 0.0, 0.0), 1.0)
+    return _of_patches(scene, len(hemicube.faces) if scene.arto.adaptive else len(hemicube))
+
+
+def _of_patches(scene: bpy.types.Scene, patches: int) -> Estimate:
+    settings = scene.arto
     images = patches * (len(patterns_of(settings)) + settings.grain)
     fitted = settings.keep == Keep.NEVER
     bytes_a_pixel = room.bytes_a_pixel(images, patches, fitted)
     tiles = tiles_of(picture_region(scene), bytes_a_pixel, room.budget(settings.memory))
-    return room.estimate([images], tiles, patches, fitted)
+    found = room.estimate([images], tiles, patches, fitted)
+    catches = any(thing.is_shadow_catcher for thing in scene.objects)
+    return found.times(1 + len(TAKES)) if catches else found
+
+
+def check_room(scene: bpy.types.Scene, folder: Path) -> None:
+    """Raise SceneError where there is no room for a capture, however few patches it takes.
+
+    A capture looks again once it knows how many. folder: where it will be.
+    """
+    found = least(scene)
+    room.check_memory(found.memory, "this capture")
+    room.check_disk(folder, found.disk, "this capture")
+
+
+def doubts(scene: bpy.types.Scene, folder: Path) -> str:
+    """Say where there may be no room for a capture; empty where there is enough in any case."""
+    try:
+        found = most(scene)
+        room.check_memory(found.memory, "this capture, at most,")
+        room.check_disk(folder, found.disk, "this capture, at most,")
+    except ArtoError as e:
+        return str(e)
+    return ""
 
 
 def guess(scene: bpy.types.Scene, short: bool = False) -> str:

@@ -128,7 +128,7 @@ def together(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> 
     hemicube = planes.wanted(scene, *Rendered(low, high).bounds())
     if settings.adaptive:
         can_refine(hemicube)
-    route, caution, probes = Route(settings.route), None, []
+    route, caution, pace, probes = Route(settings.route), None, None, []
     for frame in some:
         scene.frame_set(frame)
         with stage(scene, view_layer) as on, take(there := rendered(on), WHOLE):
@@ -140,8 +140,9 @@ def together(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> 
             if settings.adaptive and route != Route.SAMPLED:
                 found = yield from probe.probed(on, hemicube)
                 probes.append(found.reshape(len(found), 1, -1, 3))
+            pace = on.pace or pace
     if probes and route != Route.SAMPLED:
         every = np.concatenate(probes, axis=2)
         most = ADAPTIVE_SHARE * len(hemicube)
         hemicube = refine(hemicube, every, probe.SAMPLES, most)
-    return Given(hemicube, route, caution)
+    return Given(hemicube, route, caution, pace)

@@ -12,7 +12,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO
 
@@ -44,19 +44,34 @@ _LONGEST = 1 << 16
 
 @dataclass
 class Outcome:
-    """How the last job ended. level: `INFO`, `WARNING` or `ERROR`."""
+    """How the last job that the artist asked for ended.
+
+    level: `INFO`, `WARNING` or `ERROR`; blend, scene_id: the file and the scene that it was for.
+    """
 
     level: str
     text: str
     verb: Verb | None = None
+    blend: str = ""
+    scene_id: str = ""
+
+    def is_of(self, scene: bpy.types.Scene) -> bool:
+        """Whether the job was for this scene of this file."""
+        return (self.blend, self.scene_id) == (bpy.data.filepath, scene.arto.scene_id)
 
 
 class SecondBlender:
     """A running job: a second Blender that works on a snapshot in the job's own folder."""
 
-    def __init__(self, verb: Verb, scene: bpy.types.Scene, view_layer: str) -> None:
-        """Take the snapshot and start. Raises SceneError, BusyError, and then leaves no files."""
+    def __init__(
+        self, verb: Verb, scene: bpy.types.Scene, view_layer: str, guest: bool = False
+    ) -> None:
+        """Take the snapshot and start. Raises SceneError, BusyError, and then leaves no files.
+
+        guest: whether nobody asked for the work, so that it makes way for whatever is asked for.
+        """
         self.verb: Verb = verb
+        self.guest = guest
         self.begun = time.monotonic()
         shot = shot_of(scene, view_layer)
         self.title = shot.title
@@ -93,6 +108,10 @@ class SecondBlender:
         self.told: float | None = None
         self.state = State()
 
+    def is_of(self, scene: bpy.types.Scene) -> bool:
+        """Whether the job is for this scene of the open file."""
+        return (self.blend, self.scene_id) == (bpy.data.filepath, scene.arto.scene_id)
+
     def look(self) -> bool:
         """Read how far the job is, or how it ended, into `state` -> whether the job still runs."""
         running = self.process.poll() is None
@@ -107,17 +126,23 @@ class SecondBlender:
                 self.process.kill()
             return True
         if not found.end and self.told:
-            found = State(found.share, "cancelled: finished tiles are kept", end="cancelled")
+            found = State(found.share, self.stopped, end="cancelled")
         elif not found.end:
             text = f"its Blender ended too early ({ended_by(self.process.returncode)})"
             lines = self._last_lines()
-            found = State(
-                found.share,
-                f"{text}: finished tiles are kept, press it again to go on{lines}",
-                end="failed",
-            )
+            kept = self.stopped.removeprefix("cancelled: ")
+            found = State(found.share, f"{text}: {kept}, press it again{lines}", end="failed")
+        elif found.end == "cancelled":
+            found = replace(found, text=self.stopped)
         self.state = found
         return False
+
+    @property
+    def stopped(self) -> str:
+        """What to say where the job did not come to its end."""
+        if VERBS[self.verb].captures:
+            return "cancelled: parts that were finished are kept"
+        return "cancelled: nothing was changed"
 
     def _last_lines(self) -> str:
         with contextlib.suppress(OSError):
@@ -178,26 +203,48 @@ def _remove_leftovers(claimed: Path) -> None:
 
 
 current: SecondBlender | None = None
+# Guests that were told to end, and have not ended yet.
+_leaving: list[SecondBlender] = []
+# Seconds that a guest has to end by itself.
+LEAVE = 3.0
 outcome: Outcome | None = None
 # By verb, what the window does with the result of a job.
 finishers: dict[Verb, Callable[[SecondBlender], str]] = {}
 
 
+def asked_for() -> SecondBlender | None:
+    """The running job, if the artist asked for it."""
+    return current if current and not current.guest else None
+
+
 def busy() -> str:
-    """What runs, in words for a button that has to wait; empty where nothing runs."""
-    return f"ARTO is {VERBS[current.verb].doing} {current.title}" if current else ""
+    """What runs, in words for a button that has to wait; empty where nothing does."""
+    job = asked_for()
+    return f"ARTO is {VERBS[job.verb].doing} {job.title}" if job else ""
 
 
-def start(verb: Verb, scene: bpy.types.Scene, view_layer: str) -> SecondBlender:
-    """Start a job and return at once. Raises SceneError, and BusyError where a job runs already."""
+def start(
+    verb: Verb, scene: bpy.types.Scene, view_layer: str, guest: bool = False
+) -> SecondBlender:
+    """Start a job and return at once. Raises SceneError, and BusyError where a job runs already.
+
+    guest: see `SecondBlender`. A guest that runs makes way.
+    """
     global current, outcome
+    dismiss()
     if current:
         raise BusyError(f"{busy()}: wait until it is done, or cancel it")
-    outcome = None
-    current = SecondBlender(verb, scene, view_layer)
-    bpy.app.timers.register(_follow, first_interval=EVERY, persistent=True)
+    if not guest:
+        outcome = None
+    current = SecondBlender(verb, scene, view_layer, guest)
+    _follow_soon()
     watch.redraw()
     return current
+
+
+def _follow_soon() -> None:
+    if not bpy.app.timers.is_registered(_follow):
+        bpy.app.timers.register(_follow, first_interval=EVERY, persistent=True)
 
 
 def cancel() -> None:
@@ -205,11 +252,39 @@ def cancel() -> None:
         current.cancel()
 
 
+def dismiss() -> None:
+    """Send a guest away, without a word: its place is free at once, and it ends by itself."""
+    global current
+    if current is None or not current.guest:
+        return
+    job, current = current, None
+    job.cancel()
+    _leaving.append(job)
+    _follow_soon()
+
+
+def forget_outcome() -> None:
+    """Let go of what was said of the last job."""
+    global outcome
+    outcome = None
+
+
+def _reap() -> None:
+    """Remove what guests leave that have ended, and end those that take too long."""
+    for job in list(_leaving):
+        if job.process.poll() is not None:
+            _leaving.remove(job)
+            job.remove()
+        elif job.told and time.monotonic() - job.told > LEAVE:
+            job.process.kill()
+
+
 def _follow() -> float | None:
     """Look at the job's progress; after its end, let the window use the result."""
     global current, outcome
+    _reap()
     if current is None:
-        return None
+        return EVERY if _leaving else None
     job = current
     if job.look():
         _show_share(job)
@@ -222,20 +297,25 @@ def _follow() -> float | None:
         text = job.state.text
         if job.state.end == "done" and job.verb in finishers:
             text = finishers[job.verb](job)
-        outcome = Outcome(level, text, job.verb)
+        _say(job, level, text)
     except Exception as e:
-        outcome = Outcome("ERROR", f"{type(e).__name__}: {e}", job.verb)
+        _say(job, "ERROR", f"{type(e).__name__}: {e}")
         raise
     finally:
         current = None
         job.remove()
         _show_share(None)
         paths.forget()
-        if outcome:
-            print(f"ARTO {job.verb}: {outcome.text}", flush=True)
-            outcome.text = outcome.text.splitlines()[0]
         watch.redraw()
-    return None
+    return EVERY if _leaving else None
+
+
+def _say(job: SecondBlender, level: str, text: str) -> None:
+    """Note how a job ended; of a guest nothing is told but in the console."""
+    global outcome
+    print(f"ARTO {job.verb}: {text}", flush=True)
+    if not job.guest:
+        outcome = Outcome(level, text.splitlines()[0], job.verb, job.blend, job.scene_id)
 
 
 # Operators that a person has in hand. Other modal operators do not count: add-ons have some that
@@ -271,8 +351,8 @@ def plain(text: str) -> str:
 
 def _show_share(job: SecondBlender | None) -> None:
     text = None
-    if job:
-        text = f"{busy()}: {plain(job.state.text)}, {job.line}   (ESC: cancel)"
+    if job and not job.guest:
+        text = f"{busy()}: {plain(job.state.text)}, {job.line}   (the cross in ARTO's tab ends it)"
     for window in bpy.context.window_manager.windows:
         # Blender needs a window here, and a timer has none after a file was opened
         with bpy.context.temp_override(window=window):
@@ -286,14 +366,16 @@ def end() -> None:
     removes its folder by itself, so nothing waits for it here.
     """
     global current
-    if current is None:
-        return
-    job, current = current, None
-    with contextlib.suppress(OSError):
-        job.input.close()
-    with contextlib.suppress(subprocess.TimeoutExpired):
-        job.process.wait(2)
-    job.lock.__exit__(None, None, None)
+    jobs = [*_leaving, *([current] if current else [])]
+    current = None
+    _leaving.clear()
+    for job in jobs:
+        with contextlib.suppress(OSError):
+            job.input.close()
+    for job in jobs:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            job.process.wait(2)
+        job.lock.__exit__(None, None, None)
 
 
 @persistent

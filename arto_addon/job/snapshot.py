@@ -14,10 +14,12 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core import arrays, marked
 from ...core.errors import SceneError
 from ..blender import devices
+from ..blender.pictures import is_picture
 from ..shot import home
 from .task import Painted, Task
 from .verbs import Verb
@@ -70,7 +72,11 @@ def take(folder: Path, verb: Verb, scene: bpy.types.Scene, view_layer: str) -> t
 
 def in_no_file(image: bpy.types.Image) -> bool:
     """Whether an image was painted and not saved. Raises SceneError if such an image has tiles."""
-    if not image.is_dirty or image.source not in {"FILE", "GENERATED", "TILED"}:
+    if (
+        not image.is_dirty
+        or is_picture(image)
+        or image.source not in {"FILE", "GENERATED", "TILED"}
+    ):
         return False
     if image.source == "TILED":
         raise SceneError(
@@ -80,13 +86,11 @@ def in_no_file(image: bpy.types.Image) -> bool:
     return True
 
 
-def painted_pixels(image: bpy.types.Image, folder: Path) -> str:
-    """Write an image's pixels into a folder -> the name of the .npy file."""
+def pixels_of(image: bpy.types.Image) -> NDArray[np.float32]:
+    """An image's pixels, one after the other, as Blender has them."""
     pixels = np.empty(len(image.pixels), np.float32)
     image.pixels.foreach_get(pixels)
-    name = f"painted_{image.session_uid}.npy"
-    arrays.write(folder / name, pixels)
-    return name
+    return pixels
 
 
 def put_pixels(image: bpy.types.Image, path: Path) -> None:
@@ -102,7 +106,9 @@ def put_pixels(image: bpy.types.Image, path: Path) -> None:
 
 
 def _painted(image: bpy.types.Image, folder: Path) -> Painted:
-    return Painted(image.name, home.library_of(image), painted_pixels(image, folder))
+    name = f"painted_{image.session_uid}.npy"
+    arrays.write(folder / name, pixels_of(image))
+    return Painted(image.name, home.library_of(image), name)
 
 
 def _link_caches(folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""The live image, which Live shows in the window, and the directions that its pixels see."""
+"""The live image, the plate in its place, and the directions that their pixels see."""
 
 from __future__ import annotations
 
@@ -6,9 +6,13 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core import exr
 from ...core.region import Region
+from ..blender.editors import editors, replace, reveal
 from ..blender.markers import camera_of
 from ..blender.pictures import put
+from ..plate import plate
+from ..plate.names import relit_file
 
 IMAGE = "ARTO Live"
 
@@ -46,25 +50,24 @@ def push(picture: NDArray[np.float32], name: str) -> bpy.types.Image:
     Editors that show the image called `name`, the plate, show the live image from now on.
     """
     image = put(IMAGE, picture)
-    for space in spaces():
-        shown = space.image
-        if shown is not None and shown != image and shown.name == name:
-            space.image = image
+    replace(name, image)
     return image
 
 
-def spaces() -> list[bpy.types.SpaceImageEditor]:
-    """The image editors that are open."""
-    manager = bpy.context.window_manager
-    areas = [a for w in manager.windows for a in w.screen.areas] if manager else []
-    return [a.spaces.active for a in areas if a.type == "IMAGE_EDITOR"]
+def show_plate(scene: bpy.types.Scene) -> None:
+    """Show the plate on disk in place of the live image. Raises SceneError, ExrError."""
+    name, path = plate.name_of(scene), relit_file(scene)
+    image = bpy.data.images.get(name)
+    if image is None:
+        image = plate.show(plate.shown_file(path, exr.header(path)), name)
+    replace(IMAGE, image)
+    if not seen(image):
+        reveal(image)
 
 
-def redraw_pictures() -> None:
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type in {"IMAGE_EDITOR", "PROPERTIES", "VIEW_3D"}:
-                area.tag_redraw()
+def seen(image: bpy.types.Image) -> bool:
+    """Whether an editor shows an image."""
+    return any(editor.image == image for editor in editors())
 
 
 def put_away(name: str, *others: str) -> None:
@@ -73,7 +76,5 @@ def put_away(name: str, *others: str) -> None:
     name: the plate's, which editors show in their place; others: names of the other images.
     """
     for image in filter(None, map(bpy.data.images.get, (IMAGE, *others))):
-        for space in spaces():
-            if space.image == image:
-                space.image = bpy.data.images.get(name)
+        replace(image.name, bpy.data.images.get(name))
         bpy.data.images.remove(image)

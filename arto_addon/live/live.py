@@ -4,15 +4,14 @@ A timer looks at the world up to thirty times a second, and never does long work
 Blender makes the maps of the world (`maps`). A thread makes the pictures (`viewer`).
 
 While the artist changes the world, the pictures are small. After a short rest the picture has full
-size. After a longer rest a relight starts: its plate has the world's lamps and is denoised.
+size. After a longer rest a relight starts: its plate has the world's lamps and is denoised. Nobody
+asked for that relight, so it is a guest: whatever the artist does ends it. Where the plate on disk
+is of the light as it is now, the plate is shown, and not the live picture.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -22,8 +21,10 @@ from ...core import exr
 from ...core.errors import ArtoError, SceneError
 from ...core.preview import Preview
 from ..blender import handlers
+from ..blender.editors import redraw, reveal
 from ..blender.markers import camera_of
 from ..blender.quitting import not_when_quitting, when_quitting
+from ..blender.words import tr
 from ..job import session
 from ..plate.names import relit_file
 from ..plate.plate import name_of
@@ -37,8 +38,10 @@ from ..world.check import check_world, world_of
 from ..world.kept import shows
 from ..world.own import gains_of
 from . import maps
-from .image import push, put_away, redraw_pictures, spaces, view_of
+from .image import push, put_away, seen, show_plate, view_of
+from .line import FINISHED_LINE, lacking, line
 from .viewer import Viewer, Wish
+from .wished import Light, Wished
 
 EVERY = 1 / 30
 # Seconds after which the world is looked at even if Blender reported no change: it may
@@ -46,35 +49,6 @@ EVERY = 1 / 30
 ANYWAY = 0.5
 # Seconds of rest until a picture of full size is made, and until a relight is started.
 WHOLE, FINISHED = 0.25, 2.0
-
-
-@dataclass(frozen=True)
-class _Light:
-    """The light that a live picture is to show.
-
-    key: what the world shows, apart from its strength and turn; own: how much of the scene's own
-    lamps; gains: by their light groups.
-    """
-
-    key: str
-    strength: float
-    turn: float
-    own: float
-    gains: tuple[tuple[str, float], ...]
-
-
-@dataclass(frozen=True)
-class _Wished:
-    """The picture that was asked for last.
-
-    key: the world's; light: None where the map is of a world that has changed since; image: the
-    identity of the map; whole: whether the picture has full size.
-    """
-
-    key: str
-    light: _Light | None = None
-    image: int = 0
-    whole: bool = False
 
 
 class Live:
@@ -86,6 +60,7 @@ class Live:
         Raises what opening the field raises, and SceneError where the scene has no usable world.
         """
         self.scene_uid = scene.session_uid
+        self.scene_name, self.blend = scene.name, bpy.data.filepath
         self.layer = layer_of(scene)
         self.name = name_of(scene)
         check_world(scene, self.layer)
@@ -101,17 +76,24 @@ class Live:
         self.region = shown.field.region
         self._shot = self._place(scene)
         # what a live picture lacks and the relight adds, in words
-        self.later = "its brightness" if shown.held else ""
+        self.held, self.behind = shown.held, True
         self.trouble = self.problem = ""
         self.line = "Starting"
         self.dirty = True
         self._looked = 0.0
-        self._now: _Light | None = None
+        self._now: Light | None = None
         self._changed = 0.0
-        self._wished: _Wished | None = None
+        self._wished: Wished | None = None
         self._asked_with = 1.0, 0.0
-        self._finished: _Light | None = None
-        self.relighting = False
+        # the light for which a relight was started, and the relight while it runs
+        self._begun: Light | None = None
+        self.job: session.SecondBlender | None = None
+        # how long the last relight took, in seconds; why it failed
+        self.took: float | None = None
+        self.failed = ""
+        # whether the plate is of the light as it is now, so that it is shown in place of the live
+        # image
+        self.finished = False
         self.revealed = False
         self.maps.start()
 
@@ -122,38 +104,57 @@ class Live:
     def tick(self) -> bool:
         """Look at the world, ask for a picture, show the newest one.
 
-        Returns False where the scene is gone: the timer then ends. Raises SceneError where the shot
-        was captured anew.
+        Returns False where the scene is gone: the timer then ends. Raises SceneError where Live
+        cannot go on: the shot was captured anew, the file has another name, no window shows the
+        scene any more, or its world is gone.
         """
         scene = self.scene
         if scene is None:
             return False
-        if not self._same_field():
-            raise SceneError("the shot was captured anew: switch Live on again")
+        self._check(scene)
         now = time.monotonic()
         if self.dirty or now - self._looked > ANYWAY:
             self.dirty, self._looked = False, now
             self._look(scene, now)
+        self._follow_relight()
         self._wish(scene, now)
         shown = self.viewer.take()
-        if shown is not None:
+        if shown is not None and not self.finished:
             picture = np.repeat(np.repeat(shown.picture, shown.factor, 0), shown.factor, 1)
             self.name = name_of(scene)
             image = push(picture[: self.shape[0], : self.shape[1]], self.name)
             if not self.revealed:
                 self.revealed = True
-                if reveal and not any(space.image == image for space in spaces()):
+                if not seen(image):
                     reveal(image)
-            size = "Whole" if shown.factor == 1 else f"1/{shown.factor} of the size"
-            self.line = f"{size}, after {shown.latency:.2f} s"
-            if self.later:
-                self.line += f"; {self.later} comes when it is finished"
-            redraw_pictures()
+            lacks = lacking(scene, self.held, self.behind, shown.suns)
+            self.line = line(scene, shown, lacks, self.took)
+            redraw()
+            watch.redraw()
         said = self.maps.trouble_with(self._now.key) if self._now else ""
-        self.trouble = self.problem or said or self.viewer.trouble
+        trouble = self.problem or said or self.viewer.trouble or self.failed
         if self._place(scene) != self._shot:
-            self.trouble = "Live shows the shot that it was switched on for: this is another one"
+            trouble = "Live shows the shot that it was switched on for: this is another one"
+        if trouble != self.trouble:
+            self.trouble = trouble
+            watch.redraw()
         return True
+
+    def _check(self, scene: bpy.types.Scene) -> None:
+        """Raise SceneError where what is open is not what Live was switched on for."""
+        try:
+            written = (self.folder / "field.json").stat().st_mtime_ns
+        except OSError:
+            written = None
+        if written != self.written:
+            raise SceneError("the shot was captured anew: switch Live on again")
+        if bpy.data.filepath != self.blend:
+            raise SceneError("the file has another name now: switch Live on again")
+        windows = bpy.context.window_manager.windows
+        if not bpy.app.background and all(window.scene != scene for window in windows):
+            raise SceneError(
+                f"Live was on for the scene '{self.scene_name}': switch it on for this one"
+            )
 
     @staticmethod
     def _place(scene: bpy.types.Scene) -> tuple[int, float, str, int, int]:
@@ -162,25 +163,27 @@ class Live:
         camera = bound.name if bound else ""
         return scene.frame_current, scene.frame_subframe, camera, *picture_size(scene)
 
-    def _same_field(self) -> bool:
-        try:
-            return (self.folder / "field.json").stat().st_mtime_ns == self.written
-        except OSError:
-            return False
-
     def _look(self, scene: bpy.types.Scene, now: float) -> None:
         """Note what the world is now, and when it last changed."""
         world = world_of(scene, self.layer)
         if world is None:
             raise SceneError("the scene has no world any more: add one, and switch Live on again")
         key, strength, turn = shows(scene, world)
-        gains = tuple(gains_of(scene).items())
-        found = _Light(key, strength, turn, scene.arto.own_lamps, gains)
-        if found != self._now:
-            self._now, self._changed = found, now
-            if self.relighting and session.current and session.current.verb == "relight":
-                session.cancel()  # the relight is of a light that is no longer wanted
-            self.relighting = False
+        settings, gains = scene.arto, tuple(gains_of(scene).items())
+        found = Light(key, strength, turn, settings.own_lamps, gains, settings.live_finish)
+        if found == self._now:
+            return
+        self._now, self._changed, self.failed = found, now, ""
+        if self.job is not None:
+            session.dismiss()  # the relight is of a light that is no longer wanted
+            self.job = None
+        was, self.finished = self.finished, self._is_finished(scene, world)
+        if self.finished:
+            self.name, self.line = name_of(scene), FINISHED_LINE
+            show_plate(scene)
+            watch.redraw()
+        elif was:
+            self._wished = None  # the live picture is shown again
 
     def _wish(self, scene: bpy.types.Scene, now: float) -> None:
         light = self._now
@@ -207,19 +210,18 @@ class Live:
                 return
             image = newest[1]
             strength, turn = self._asked_with
-            wished = _Wished(newest[0])
+            wished = Wished(newest[0])
         else:
-            wished = _Wished(key, light, id(image), rest > WHOLE and full is not None)
+            wished = Wished(key, light, id(image), rest > WHOLE and full is not None)
         if wished != self._wished:
             self._wished = wished
             gains = gains_of(scene)
             view = None
             if not scene.render.film_transparent:
                 view = view_of(scene, self.shape, self.region)
-                if view is None:
-                    self.later = "the world behind"
+                self.behind = view is not None
             self.viewer.wish(Wish(image, strength, turn, light.own, gains, wished.whole, view))
-        if rest > FINISHED and self.settled and scene.arto.live_finish:
+        if light.finish and not self.finished and rest > FINISHED and self.settled:
             self._finish(scene)
 
     @property
@@ -232,31 +234,58 @@ class Live:
 
     def _finish(self, scene: bpy.types.Scene) -> None:
         """Start the relight of the light that is shown, once for each light."""
-        if self._finished == self._now or session.current or bpy.app.is_job_running("RENDER"):
+        if self._begun == self._now or session.current or bpy.app.is_job_running("RENDER"):
             return
-        self._finished = self._now
-        if self._is_finished(scene):
-            return
-        self.relighting = True
-        session.start("relight", scene, self.layer)
+        self._begun = self._now
+        self.job = session.start("relight", scene, self.layer, guest=True)
 
-    def _is_finished(self, scene: bpy.types.Scene) -> bool:
-        """Whether the plate on disk is already of this light and this field."""
+    def _follow_relight(self) -> None:
+        """Say how far the relight is, or why it failed."""
+        job = self.job
+        if job is None:
+            return
+        if job.state.end:
+            self.job = None
+            if job.state.end == "failed":
+                self.failed = f"not finished: {job.state.text.splitlines()[0]}"
+        elif session.current is not job:
+            # whatever the artist pressed came first: the light is finished after it
+            self.job, self._begun, self._changed = None, None, time.monotonic()
+        else:
+            self.line = tr("Finishing, with suns and denoised: {share:.0%}", share=job.state.share)
+
+    def relit(self, scene: bpy.types.Scene) -> bool:
+        """A relight has ended -> whether its plate is to be shown: not if the light changed."""
+        world = world_of(scene, self.layer)
+        if scene != self.scene or world is None:
+            return True
+        asked_for = self.job is None
+        if self.job is not None:
+            self.took, self.job = self.job.spent, None
+        self.finished = self._is_finished(scene, world)
+        if self.finished:
+            self.line = FINISHED_LINE
+        return self.finished or asked_for
+
+    def _is_finished(self, scene: bpy.types.Scene, world: bpy.types.World) -> bool:
+        """Whether the plate on disk is already of this light and this field, and to be shown."""
+        if not scene.arto.live_finish:
+            return False
         try:
             path = relit_file(scene)
-            world = check_world(scene, self.layer)
             same = exr.header(path).get(HEADER) == light_key(scene, world, self.layer)
             return same and path.stat().st_mtime_ns >= self.written
         except (ArtoError, OSError):
             return False
 
-    def close(self) -> None:
-        self.viewer.close()
-        self.maps.close()
+    def close(self, wait: bool = True) -> None:
+        """End the thread, the second Blender and the relight. wait: until they have ended."""
+        self.viewer.close(wait)
+        self.maps.close(wait)
+        if self.job is not None:
+            session.dismiss()
 
 
-# Opens an image where the artist sees it. The window sets this function (`ui`).
-reveal: Callable[[bpy.types.Image], None] | None = None
 current: Live | None = None
 # Why Live is off, where it ended by itself.
 trouble = ""
@@ -278,7 +307,7 @@ def stop() -> None:
     if current is None:
         return
     ended, current = current, None
-    ended.close()
+    ended.close(wait=False)
     put_away(ended.name)
 
 
@@ -316,8 +345,10 @@ def _undone(*_: object) -> None:
 
 
 @persistent
-def _stop(*_: object) -> None:
+def _another_file(*_: object) -> None:
+    global trouble
     stop()
+    trouble = ""
 
 
 @persistent
@@ -331,7 +362,7 @@ def _quitting(*_: object) -> None:
 
 _HANDLERS = {
     "depsgraph_update_post": _changed,
-    "load_pre": _stop,
+    "load_pre": _another_file,
     "undo_post": _undone,
     "redo_post": _undone,
 }
@@ -351,9 +382,6 @@ def unregister() -> None:
         bpy.app.timers.unregister(_tick)
 
 
-def wrote(path: Path) -> bool:
-    """A relight has ended -> whether to show its plate; not if Live wants a newer light by now."""
-    if current is None or not current.relighting:
-        return True
-    current.relighting = False
-    return bool(path) and current._finished == current._now
+def wrote(scene: bpy.types.Scene) -> bool:
+    """A relight of a scene has ended -> whether to show its plate; not if the light changed."""
+    return current is None or current.relit(scene)

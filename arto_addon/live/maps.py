@@ -11,7 +11,6 @@ import contextlib
 import json
 import subprocess
 import sys
-import tempfile
 import threading
 from collections import OrderedDict
 from dataclasses import asdict, dataclass
@@ -24,12 +23,13 @@ from numpy.typing import NDArray
 from ...core import arrays, marked
 from ...core.errors import ArtoError, SceneError
 from ...core.memory import ended_by
-from ..blender import scripts
+from ..blender import scratch, scripts
 from ..blender.addon import ADDON
 from ..blender.colour import work_in, working_space
 from ..blender.nodes import shader_tree, trees
-from ..job.snapshot import in_no_file, painted_pixels, put_pixels
-from ..shot import home, walk
+from ..job.snapshot import in_no_file, pixels_of, put_pixels
+from ..shot import home
+from ..shot.pixels import image as digest_of
 from ..world import kept
 from ..world.bake import rough
 from ..world.check import check_world
@@ -77,8 +77,7 @@ class Maps:
     def __init__(self) -> None:
         """Make a temporary folder. Raises SceneError where there is no room for it."""
         try:
-            self._folder = Path(tempfile.mkdtemp(prefix="arto-live-"))
-            marked.mark(self._folder, "maps")
+            self._folder = scratch.make()
         except OSError as e:
             raise SceneError(f"there is no room for temporary files ({e})") from e
         self._process: subprocess.Popen[str] | None = None
@@ -89,6 +88,8 @@ class Maps:
         self._lock = threading.Lock()
         self.trouble = ""
         self._number = 0
+        # the digests of painted images, by the files with their pixels
+        self._painted: dict[Path, str] = {}
         self._failed: dict[tuple[str, bool], str] = {}
 
     def start(self) -> None:
@@ -146,9 +147,15 @@ class Maps:
         blend = self._folder / f"world{self._number}.blend"
         painted = {}
         name = _write(scene, layer, world, blend)
+        pixels: dict[Path, NDArray[np.float32]] = {}
         for image in images(world):
-            if in_no_file(image):
-                painted[image.name] = str(self._folder / painted_pixels(image, self._folder))
+            if not in_no_file(image):
+                continue
+            path, digest = self._folder / f"painted_{image.session_uid}.npy", digest_of(image)
+            if self._painted.get(path) != digest:
+                self._painted[path] = digest
+                pixels[path] = pixels_of(image)
+            painted[image.name] = str(path)
         question = Question(
             blend=str(blend),
             world=name,
@@ -163,6 +170,26 @@ class Maps:
             out=str(self._folder / MAP),
         )
         self._asked = (key, full)
+        if pixels:  # writing many pixels takes long, and the window does not wait for it
+            threading.Thread(target=self._send, args=(process, question, pixels)).start()
+            return True
+        return self._send(process, question, pixels)
+
+    def _send(
+        self,
+        process: subprocess.Popen[str],
+        question: Question,
+        pixels: dict[Path, NDArray[np.float32]],
+    ) -> bool:
+        """Write painted pixels, then the question -> whether it was sent."""
+        assert process.stdin
+        try:
+            for path, values in pixels.items():
+                arrays.write(path, values)
+        except OSError as e:
+            self._painted.clear()
+            self._answered(None, f"painted pixels cannot be written ({e}): make room on the disk")
+            return False
         try:
             process.stdin.write(json.dumps(asdict(question)) + "\n")
             process.stdin.flush()
@@ -206,8 +233,17 @@ class Maps:
             while len(self._found) > MOST:
                 self._found.popitem(last=False)
 
-    def close(self) -> None:
-        """End the second Blender and remove the temporary files."""
+    def close(self, wait: bool = True) -> None:
+        """End the second Blender and remove the temporary files.
+
+        wait: until that is done; the window does not wait.
+        """
+        leaving = threading.Thread(target=self._leave)
+        leaving.start()
+        if wait:
+            leaving.join()
+
+    def _leave(self) -> None:
         if self._process:
             with contextlib.suppress(OSError):
                 assert self._process.stdin
@@ -217,7 +253,7 @@ class Maps:
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
-        marked.remove_quietly(self._folder, "maps", self._folder.parent)
+        scratch.remove(self._folder)
 
 
 def _map(path: Path) -> NDArray[np.float32]:
@@ -298,7 +334,7 @@ def _made(asked: Question) -> str:
         arrays.write(Path(asked.out), found.image)
     finally:
         bpy.data.worlds.remove(world)
-        marked.remove_file(Path(asked.blend), "maps")
+        marked.remove_file(Path(asked.blend), "temporary")
         bpy.data.orphans_purge(do_recursive=True)
     return asked.out
 
@@ -316,7 +352,7 @@ def _reduced(image: bpy.types.Image) -> bpy.types.Image | None:
     scale = min(width // (2 * ROUGH_WIDTH), height // ROUGH_WIDTH)
     if image.source != "FILE" or scale < 2 or image.is_dirty:
         return None
-    digest = walk.image(image)
+    digest = digest_of(image)
     key = digest, image.filepath, image.colorspace_settings.name, image.alpha_mode
     if key in _small and _small[key] in bpy.data.images:
         return bpy.data.images[_small[key]]

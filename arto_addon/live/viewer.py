@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import ArtoError, FieldError
 from ...core.light.environment import Environment
+from ...core.light.lamps import split
 from ...core.light.light import PatchLight
 from ...core.preview import Preview
 from ...core.relight import over
@@ -47,13 +48,15 @@ class Drawn:
     """A picture that was worked out.
 
     picture: (h, w, 4) at 1 / factor of the full size, rows top-down; latency: seconds from the wish
-    to the picture.
+    to the picture; suns: the share of the light of suns that a relight would render by themselves;
+    0 where there are none, and for pictures of less than the full size.
     """
 
     wish: Wish
     picture: NDArray[np.float32]
     factor: int
     latency: float
+    suns: float = 0.0
 
 
 class Viewer:
@@ -91,11 +94,13 @@ class Viewer:
 
     _busy = False
 
-    def close(self) -> None:
+    def close(self, wait: bool = True) -> None:
+        """End the thread, after the picture that it is at. wait: until it has ended."""
         with self._condition:
             self._closed = True
             self._condition.notify()
-        self._thread.join(10)
+        if wait:
+            self._thread.join(10)
 
     def _run(self) -> None:
         while True:
@@ -145,7 +150,20 @@ def show(preview: Preview, wish: Wish) -> Drawn:
             "the picture is infinite or not a number in some pixels: look what is so bright in the "
             "world, or capture again"
         )
-    return Drawn(wish, picture, factor, time.perf_counter() - wish.at)
+    suns = _suns(wish.image) if wish.resting else 0.0
+    return Drawn(wish, picture, factor, time.perf_counter() - wish.at, suns)
+
+
+# The last map whose suns were looked for, and their share: a turn or a strength does not change it.
+_lit: list[tuple[NDArray[np.float32], float]] = []
+
+
+def _suns(image: NDArray[np.float32]) -> float:
+    """The share of a map's light that suns have which are worth a render; 0 for none."""
+    if not _lit or _lit[0][0] is not image:
+        found = split(Environment(image))
+        _lit[:] = [(image, found.share if found.worth else 0.0)]
+    return _lit[0][1]
 
 
 # The last map that was made coarser, and the result: while a world is turned its map is the same.

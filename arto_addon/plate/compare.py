@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
-
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core import exr
 from ...core.errors import SceneError
-from ..blender.output import float_exr
+from ..blender.output import borrowed
 from ..blender.pictures import put
+from ..blender.scratch import temporary
 from .names import relit_file
 
 IMAGE = "ARTO Compare"
@@ -29,7 +27,7 @@ def begin(scene: bpy.types.Scene) -> bpy.types.Image:
     if not path.is_file():
         raise SceneError("there is no plate to compare: press Relight first")
     plate = next(iter(exr.read(path).values()))
-    render = _last_render()
+    render = _last_render(scene)
     if render.shape[:2] != plate.shape[:2]:
         raise SceneError(
             f"the last render is {render.shape[1]} x {render.shape[0]}, the plate "
@@ -41,26 +39,22 @@ def begin(scene: bpy.types.Scene) -> bpy.types.Image:
     return update(scene) or bpy.data.images[IMAGE]
 
 
-def _last_render() -> NDArray[np.float32]:
-    """Read Blender's last render -> (H, W, 4). Raises SceneError where there is none."""
-    result = bpy.data.images.get("Render Result")
-    settings = bpy.data.scenes.new("ARTO Output")
-    try:
-        float_exr(settings.render, multilayer=False)
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "render.exr"
-            if result is None:
-                raise SceneError("nothing was rendered yet: press F12 once, then Compare")
-            try:
-                result.save_render(str(path), scene=settings)
-            except RuntimeError as e:
-                raise SceneError(
-                    "there is no render to compare with: set Use in Compositor to In a Viewer, "
-                    f"press F12, then Compare ({e})"
-                ) from e
-            return next(iter(exr.read(path).values()))
-    finally:
-        bpy.data.scenes.remove(settings)
+def _last_render(scene: bpy.types.Scene) -> NDArray[np.float32]:
+    """Read the last render of a scene -> (H, W, 4). Raises SceneError where there is none."""
+    result = next((i for i in bpy.data.images if i.type == "RENDER_RESULT"), None)
+    if result is None:
+        raise SceneError("nothing was rendered yet: press F12 once, then Compare")
+    with temporary() as folder, borrowed(scene.render):
+        path = folder / "render.exr"
+        try:
+            # Blender gives out the render of the scene that is named here, and of no other.
+            result.save_render(str(path), scene=scene)
+        except RuntimeError as e:
+            raise SceneError(
+                f"there is no render of '{scene.name}' to compare with: set Use in Compositor to "
+                f"In a Viewer, press F12, then Compare ({e})"
+            ) from e
+        return next(iter(exr.read(path).values()))
 
 
 def update(scene: bpy.types.Scene) -> bpy.types.Image | None:

@@ -13,6 +13,7 @@ import bpy
 from ...core.errors import SceneError
 from ...core.file_names import safe_name, short_hash
 from ..shot import home
+from ..shot.scene_id import is_alone
 
 # Endings that an artist may give to an output by habit: .exr takes their place.
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr"}
@@ -26,12 +27,12 @@ _HASHES = re.compile(r"([._-]?)(#+)(?=[^#]*$)")
 
 def relit_name(scene: bpy.types.Scene, look: str | None = None) -> str:
     """The name by which this scene's plate differs from those of other scenes and looks; empty for
-    a file's only scene without a look.
+    the scene that is alone (`scene_id.is_alone`), without a look.
 
     The image is then `ARTO <scene> <look>`, the file `<blend>_<scene>_<look>.exr`.
     """
     shown: str = scene.arto.look.strip() if look is None else look
-    if not shown and len(bpy.data.scenes) == 1:
+    if not shown and is_alone(scene):
         return ""
     name = f"{scene.name} {shown}".strip()
     others = [s.name for s in bpy.data.scenes if s != scene]
@@ -97,7 +98,8 @@ def relit_file(scene: bpy.types.Scene, look: str | None = None, frame: int | Non
         elif path.suffix.lower() != ".exr":  # The dot belongs to the name, as in `shot.v2`.
             path = path.with_name(path.name + ".exr")
         # A copied scene has the output of its original, so the scene's name tells them apart.
-        shared = any(s.arto.output == scene.arto.output for s in bpy.data.scenes if s != scene)
+        others = [s for s in bpy.data.scenes if s != scene and not is_alone(scene)]
+        shared = any(s.arto.output == scene.arto.output for s in others)
         parts = [*([safe_name(scene.name)] if shared else []), *([of_look(look)] if look else [])]
         # Hashes stand for the frame's number, which stays last in the name.
         stem, mark, number = path.stem, *_numbered(path.stem, at)

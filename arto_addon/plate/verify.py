@@ -81,8 +81,8 @@ def verify_plate(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps
 
 
 def said(scene: bpy.types.Scene, found: Verdict) -> str:
-    """Say in a sentence or two what was found."""
-    text = f"{found.line}; mean difference {found.error:.1%}, noise {found.noise:.1%}"
+    """Say in a sentence or two what was found, in words that do not gainsay each other."""
+    text = found.line
     settings = scene.arto
     if settings.own_lamps != 1 or any(gain != 1 for gain in gains_of(scene).values()):
         text += ". The plate has the scene's lamps at other gains than a render"

@@ -19,7 +19,7 @@ from ..plate import mattes
 from ..plate.footage import TIMING, footage
 from ..settings.setting import Decides
 from ..settings.table import values
-from ..shot import paths, status, walk, watch
+from ..shot import paths, pixels, status, walk, watch
 from ..shot.fingerprint import key_of, of_blocks
 from ..shot.shot import layer_of, shot_of
 from ..world.kept import shows
@@ -124,7 +124,7 @@ def _footage(scene: bpy.types.Scene) -> object:
             ]
             timing = found.timing if found.timing is not None else source
             return [*of, *(getattr(timing, name, None) for name in TIMING)]
-        return [*of, walk.image(source)]
+        return [*of, pixels.image(source)]
     except ArtoError as e:  # the plate cannot be made again, so it is not up to date
         return str(e)
 

@@ -38,6 +38,20 @@ SHOT = (
         option=False,
         panels=(),
     ),
+    Setting(
+        name="alone",
+        kind="text",
+        title="Alone",
+        words="The Scene ID, where the scene was the file's only one when it got its ID. The names "
+        "of its plates then do not tell the scene, also beside scenes that come later",
+        default="",
+        hidden=True,
+        work="shot",
+        decides=Decides.NOTHING,
+        farm=False,
+        option=False,
+        panels=(),
+    ),
 )
 # This order is the order of the command line's options, and of the settings in a farm's job.
 SETTINGS = (*HEMICUBE, *CAPTURE, *FIT, *LIGHT, *FILES, *SHOWN, *SHOT)

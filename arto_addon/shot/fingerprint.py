@@ -20,7 +20,7 @@ import bpy
 import numpy as np
 
 from ..blender.markers import camera_of
-from . import walk
+from . import pixels, walk
 
 Fingerprint = dict[str, str]
 
@@ -116,7 +116,7 @@ def of_blocks(
             digest += _arrays[block.session_uid]
         elif isinstance(block, bpy.types.Image):
             was = then.get(name, "")[len(digest) :]
-            digest += walk.image(block, was, full)
+            digest += pixels.image(block, was, full)
         elif isinstance(block, _EXTERNAL):
             was = then.get(name, "")[len(digest) :]
             digest += walk.file(block.filepath, block.library, was, full)

@@ -57,7 +57,7 @@ class Place:
         """The folder to read from. Raises ShotError where the folder has another owner."""
         if self.owner:
             raise ShotError(
-                f"what is there was captured for {self.owner}: press Use It There in ARTO's panel "
+                f"what is there was captured for {self.owner}: press Use It Here in ARTO's panel "
                 "(or --command arto adopt) to work with it here, or capture this shot"
             )
         return self.source

@@ -50,7 +50,29 @@ def give(scene: bpy.types.Scene, scene_id: str | None = None) -> bool:
         return False
     scene.arto.scene_id = scene_id or uuid.uuid4().hex
     _given[scene.session_uid] = scene.arto.scene_id
+    _note_alone(scene)
     return True
+
+
+def _note_alone(scene: bpy.types.Scene) -> None:
+    if len(bpy.data.scenes) == 1:
+        scene.arto.alone = scene.arto.scene_id
+
+
+def is_alone(scene: bpy.types.Scene) -> bool:
+    """Whether the names of the scene's plates need not tell the scene.
+
+    So it is for a file's only scene, and stays so when other scenes come to the file: a plate keeps
+    its name. At most one scene of a file is alone.
+    """
+    marked = [s for s in bpy.data.scenes if s.arto.alone and s.arto.alone == of(s)]
+    # a scene that was appended brings its mark along: the one that was here first has it by right
+    uids = list(_given)
+    order = [s.session_uid for s in marked if s.session_uid in uids]
+    first = min(order, key=uids.index, default=None)
+    if marked:
+        return scene == next((s for s in marked if s.session_uid == first), marked[0])
+    return len(bpy.data.scenes) == 1 and not of(scene)
 
 
 @persistent
@@ -68,6 +90,7 @@ def _after_load(*_: object) -> None:
     for scene in bpy.data.scenes:
         if found := of(scene):
             _given[scene.session_uid] = found
+            _note_alone(scene)  # a file of an earlier version says nothing of it
 
 
 _HANDLERS = {"undo_post": _after_undo, "redo_post": _after_undo, "load_post": _after_load}

@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 import bpy
 
 from ...core.capture.capture_set import CaptureSet
-from ...core.capture.head import HEADER
+from ...core.capture.head import HEADER, CaptureHead
 from ...core.errors import ArtoError
 from ...core.field.field import Field
 from ...core.field.head import HEADER as FIELD_HEADER
@@ -64,16 +64,22 @@ def _place(scene: bpy.types.Scene, view_layer: str | None) -> Place | None:
 
 def unfinished(folder: Path) -> list[str]:
     """Say how far each stopped capture in a shot's folder is, as `2 of 7 tiles`, newest first."""
+    return [done(head) for head in stopped(folder)]
+
+
+def stopped(folder: Path) -> list[CaptureHead]:
+    """The heads of the stopped captures in a shot's folder, newest first."""
     found = []
     for path in folder.glob("unfinished-*/" + HEADER):
-        try:
-            there = _captures.get(path)
-        except OSError:
-            continue
+        there = capture_at(path)
         if there:
-            head = there.head
-            found.append((path.stat().st_mtime_ns, f"{head.done} of {len(head.tiles)} tiles"))
-    return [text for _, text in sorted(found, reverse=True)]
+            found.append((path.stat().st_mtime_ns, there.head))
+    return [head for _, head in sorted(found, key=lambda f: -f[0])]
+
+
+def done(head: CaptureHead) -> str:
+    """How far a capture is, in words."""
+    return f"{head.done} of {len(head.tiles)} tiles"
 
 
 def capture_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line | None:
@@ -86,10 +92,10 @@ def capture_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line 
     there = _capture_set(place)
     if isinstance(there, tuple):
         return there
-    stopped = unfinished(place.source)
-    if there is None and stopped:
+    left = unfinished(place.source)
+    if there is None and left:
         # Whether Capture would go on with it depends on all settings, so the line does not say.
-        return f"unfinished, {stopped[0]}", False
+        return f"unfinished, {left[0]}", False
     if there is None:
         other = _nearest(scene, view_layer, place)
         return _of_this_shot(scene, view_layer, other, None, "") if other else None

@@ -282,26 +282,6 @@ def shape_keys(keys: bpy.types.Key) -> str:
 _contents: dict[tuple[str, int, int, int, int], str] = {}
 
 
-def image(block: bpy.types.Image, then: str = "", full: bool = False) -> str:
-    """The digest of an image: of its painted or generated pixels, else of packed data or the file.
-
-    then: the digest that the new one will be compared with. A file with a new time and the same
-    size is read. If its contents are the same, the answer is `then`. full: read the file in any
-    case.
-    """
-    out = hashlib.blake2b(digest_size=12)
-    if block.is_dirty or (block.source == "GENERATED" and not block.packed_file):
-        values = np.empty(len(block.pixels), np.float32)
-        block.pixels.foreach_get(values)
-        out.update(values)
-        return out.hexdigest()
-    if block.packed_files:
-        for packed in block.packed_files:
-            out.update(packed.packed_file.data)
-        return out.hexdigest()
-    return file(block.filepath, block.library, then, full)
-
-
 def file(path: str, library: bpy.types.Library | None, then: str = "", full: bool = False) -> str:
     """The digest of a file: `size:time:digest of the contents`. then, full: see `image`."""
     if not path:

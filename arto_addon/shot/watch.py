@@ -7,10 +7,13 @@ from bpy.app.handlers import persistent
 
 from ..blender import handlers
 from . import fingerprint as prints
+from . import pixels
 from .fingerprint import Fingerprint
 
 # Seconds without a change before the scene is looked at.
 REST = 0.3
+# By the type of an area, the region that panels are in.
+_PANELS = {"PROPERTIES": "WINDOW", "VIEW_3D": "UI", "IMAGE_EDITOR": "UI", "NODE_EDITOR": "UI"}
 _latest: dict[tuple[int, str], Fingerprint] = {}
 _asked: dict[tuple[int, str], Fingerprint] = {}
 _stale: set[tuple[int, str]] = set()
@@ -65,16 +68,35 @@ def _look() -> float | None:
     return None
 
 
+def _read_soon() -> None:
+    """Look again once the digest of a large image is there, which a thread makes."""
+    if not bpy.app.timers.is_registered(_await_pixels):
+        bpy.app.timers.register(_await_pixels, first_interval=REST)
+
+
+def _await_pixels() -> float | None:
+    if pixels.reading():
+        return REST
+    if _asked:
+        _stale.update(_asked)
+        _look_soon()
+    redraw()
+    return None
+
+
 def redraw() -> None:
-    """Redraw all areas that may show ARTO's panels."""
+    """Redraw the regions that may show ARTO's panels, and nothing beside them."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
-            if area.type in {"PROPERTIES", "VIEW_3D", "IMAGE_EDITOR", "NODE_EDITOR"}:
-                area.tag_redraw()
+            for region in area.regions:
+                if region.type == _PANELS.get(area.type) and region.width > 1:
+                    region.tag_redraw()
 
 
 @persistent
 def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    images = [u.id.original for u in depsgraph.updates if isinstance(u.id, bpy.types.Image)]
+    pixels.forget(image.session_uid for image in images)
     if not _asked:
         return
     # Digests are kept of a mesh's arrays, of its shape keys, and of its object's deformed shape. A
@@ -99,6 +121,7 @@ def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 def _all_changed(*_: object) -> None:
     """Look at everything again, after undo, redo, or another file."""
     prints.forget()
+    pixels.forget()
     scenes = {s.session_uid for s in bpy.data.scenes}
     for kept in (_latest, _asked):
         for key in [k for k in kept if k[0] not in scenes]:
@@ -121,11 +144,14 @@ def register() -> None:
     if bpy.app.background:
         return  # Without a window nothing is drawn, and `latest` makes the fingerprint itself.
     handlers.add(_HANDLERS)
+    pixels.begun = _read_soon
 
 
 def unregister() -> None:
     handlers.remove(_HANDLERS)
-    if bpy.app.timers.is_registered(_look):
-        bpy.app.timers.unregister(_look)
+    for timer in (_look, _await_pixels):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)
+    pixels.begun = None
     for kept in (_latest, _asked, _stale):
         kept.clear()

@@ -13,6 +13,7 @@ import bpy
 
 from ...core.capture.kinds import Quality
 from ..blender.nodes import dark_world
+from ..blender.words import tr
 from .stage import Stage
 
 
@@ -110,17 +111,18 @@ def samples_of(scene: bpy.types.Scene) -> int:
 def looks_otherwise(scene: bpy.types.Scene) -> list[str]:
     """Say by which of its settings the artist's render looks otherwise than the relit picture.
 
-    A sentence for each such setting, untranslated.
+    A sentence for each such setting, in the language of the interface.
     """
     found = []
     for change in CHANGES:
         value = scene.path_resolve(change.setting)
         if change.look and value != change.to:
-            found.append(change.look.format(f"{value:g}" if isinstance(value, float) else value))
+            shown = f"{value:g}" if isinstance(value, float) else value
+            found.append(tr(change.look).format(shown))
     if scene.render.use_stamp:
-        found.append("Your render burns metadata into the picture; the relit picture does not")
+        found.append(tr("Your render burns metadata into the picture; the relit picture does not"))
     if scene.render.use_sequencer and _has_strips(scene):
-        found.append("Your render shows the sequencer; the relit picture shows the scene")
+        found.append(tr("Your render shows the sequencer; the relit picture shows the scene"))
     return found
 
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import bpy
 from numpy.typing import NDArray
 
 from ...core import exr
 from ..blender.output import write_to
+from ..blender.scratch import temporary
 from ..work import Render, Steps
 from .stage import Pace, Stage, picture_region, picture_size
 
@@ -53,8 +52,8 @@ def parts_of(
     share: how much of the whole work was done before, 0 to 1; span: how much of the whole work this
     render is. Raises CancelledError.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "small.exr"
+    with temporary() as folder:
+        path = folder / "small.exr"
         write_to(on.scene.render, path)
         request = Render(on.scene.name, share, text, span)
         with _timed() as laps:

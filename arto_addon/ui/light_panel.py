@@ -6,9 +6,9 @@ import contextlib
 
 import bpy
 
-from ...core import exr
 from ...core.errors import ArtoError
 from ..blender.compositing import compositor
+from ..blender.words import tr
 from ..live import live
 from ..plate.names import relit_file
 from ..plate.plate import name_of
@@ -18,7 +18,8 @@ from ..shot import status
 from ..world import controls, dials
 from ..world.check import world_of
 from . import thumbnails
-from .places import Draws, say
+from .places import Draws, say, sentence, slot
+from .result_panel import header_of
 
 
 class LightPanel(Draws):
@@ -33,6 +34,8 @@ class LightPanel(Draws):
         if world is None:
             say(column, context, "The scene has no world", "ERROR")
             column.operator("arto.open_hdri", icon="FILE_FOLDER")
+            if live.trouble:
+                say(column, context, sentence(live.trouble), "ERROR")
             return
         _world(column, context, world)
         _live(column, context)
@@ -75,28 +78,28 @@ def _live(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
     row.prop(switch, "live", toggle=True, icon="LIGHT_SUN")
     row.prop(scene.arto, "live_finish", text="", icon="CHECKMARK")
     row.prop(switch, "overlay", text="", icon="MESH_CUBE")
-    # always draw a line, so that what is below does not jump
+    # always two lines, so that what is below does not jump
     if live.current is not None:
-        say(column, context, live.current.trouble or live.current.line)
+        slot(column, context, live.current.trouble or live.current.line)
     elif live.trouble:
-        say(column, context, live.trouble[0].upper() + live.trouble[1:], "ERROR")
+        slot(column, context, sentence(live.trouble), "ERROR")
     elif there:
-        say(column, context, "Follows the world as you change it")
+        slot(column, context, "Follows the world as you change it")
     else:
-        say(column, context, "Capture the shot to see it live", "INFO")
+        slot(column, context, "Capture the shot to see it live", "INFO")
     column.prop(scene.arto, "lamps")
-    if scene.arto.lamps and (text := lamps_line(scene)):
-        say(column, context, text)
+    if scene.arto.lamps:
+        slot(column, context, lamps_line(scene), lines=1)
 
 
 def lamps_line(scene: bpy.types.Scene) -> str:
-    """What the last plate's header says of the HDRI's suns."""
+    """What the last plate's header says of the HDRI's suns; empty without a plate."""
     try:
-        header = exr.header(relit_file(scene))
+        header = header_of(relit_file(scene))
     except (ArtoError, OSError):
         return ""
     found = str(header.get("arto.lamps", ""))
-    return f"Suns: {found}" if found and found != "no" else ""
+    return tr("Suns: {found}", found=found) if found and found != "no" else "This light has no suns"
 
 
 def _own(column: bpy.types.UILayout, context: bpy.types.Context) -> None:

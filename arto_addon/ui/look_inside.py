@@ -6,7 +6,9 @@ import bpy
 import numpy as np
 
 from ...core.errors import ArtoError
+from ..blender.editors import Editor, editors, reveal
 from ..blender.pictures import put
+from ..job import session
 from ..live.image import IMAGE as LIVE
 from ..plate import compare
 from ..plate.plate import name_of
@@ -14,18 +16,16 @@ from ..relight import inside
 from ..world import controls
 from ..world.check import world_of
 from .operators import Quick, can_relight, free
-from .reveal import reveal
 
 
-def under(
-    context: bpy.types.Context, event: bpy.types.Event
-) -> tuple[bpy.types.SpaceImageEditor, float, float] | None:
+def under(context: bpy.types.Context, event: bpy.types.Event) -> tuple[Editor, float, float] | None:
     """The image editor under the mouse, and where the mouse is in the editor's picture.
 
-    -> (space, u, v), u and v from the left and the bottom, 0 to 1; None outside.
+    -> (editor, u, v), u and v from the left and the bottom, 0 to 1; None outside.
     """
-    for area in context.window.screen.areas:
-        if area.type != "IMAGE_EDITOR" or area.spaces.active.image is None:
+    for editor in editors():
+        area = editor.area
+        if editor.window != context.window or editor.image is None:
             continue
         region = next(r for r in area.regions if r.type == "WINDOW")
         x, y = event.mouse_x - region.x, event.mouse_y - region.y
@@ -38,7 +38,7 @@ def under(
             ):
                 return None
             u, v = region.view2d.region_to_view(x, y)
-            return area.spaces.active, u, v
+            return editor, u, v
     return None
 
 
@@ -56,12 +56,11 @@ class _Picking(Quick):
     def begin(self, context: bpy.types.Context) -> None:
         """Show the picture to click into. Raises ArtoError."""
 
-    def picked(
-        self, context: bpy.types.Context, space: bpy.types.SpaceImageEditor, u: float, v: float
-    ) -> str:
+    def picked(self, context: bpy.types.Context, editor: Editor, u: float, v: float) -> str:
         raise NotImplementedError
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        session.dismiss()
         try:
             self.begin(context)
         except ArtoError as e:
@@ -93,6 +92,7 @@ class _Picking(Quick):
             self.report({"ERROR"}, str(e))
             return {"CANCELLED"}
         context.window_manager.arto.seen = text
+        context.window_manager.arto.seen_in = context.scene.name_full
         self.report({"INFO"}, text.splitlines()[0])
         for area in context.window.screen.areas:
             area.tag_redraw()
@@ -116,20 +116,18 @@ patches with the HDRI on them"""
 
     def begin(self, context: bpy.types.Context) -> None:
         scene = context.scene
-        showing = {s.image.name for s in _spaces(context) if s.image}
+        showing = {e.image.name for e in editors() if e.image}
         if not showing & {name_of(scene), LIVE, inside.FROM}:
             bpy.ops.arto.show_plate()
 
-    def picked(
-        self, context: bpy.types.Context, space: bpy.types.SpaceImageEditor, u: float, v: float
-    ) -> str:
-        if space.image.name in {inside.IMAGE, compare.IMAGE}:
+    def picked(self, context: bpy.types.Context, editor: Editor, u: float, v: float) -> str:
+        if editor.space.image.name in {inside.IMAGE, compare.IMAGE}:
             bpy.ops.arto.show_plate()
             return "That is no pixel of the relit picture: it is shown now, click again"
-        width, height = space.image.size
+        width, height = editor.space.image.size
         x, y = int(np.floor(u * width)), int(np.floor((1 - v) * height))
         found = inside.look(context.scene, x, y)
-        space.image = put(inside.IMAGE, found.picture, display=True)
+        editor.show(put(inside.IMAGE, found.picture, display=True))
         return "\n".join(found.lines)
 
 
@@ -145,7 +143,7 @@ from there gives to it"""
         scene = context.scene
         world = world_of(scene)
         hdri = controls.hdri(world) if world else None
-        showing = {s.image.name for s in _spaces(context) if s.image}
+        showing = {e.image.name for e in editors() if e.image}
         if inside.IMAGE in showing or (hdri and hdri.name in showing):
             return
         shown = inside.Shown(scene, inside.layer_of(scene))
@@ -153,20 +151,13 @@ from there gives to it"""
         picture = inside.drawn(shown.field.hemicube, environment, [], inside.SIDE, show=0.0)
         reveal(put(inside.IMAGE, picture, display=True))
 
-    def picked(
-        self, context: bpy.types.Context, space: bpy.types.SpaceImageEditor, u: float, v: float
-    ) -> str:
-        direction = inside.direction_at(context.scene, space.image.name, u, v)
+    def picked(self, context: bpy.types.Context, editor: Editor, u: float, v: float) -> str:
+        direction = inside.direction_at(context.scene, editor.space.image.name, u, v)
         if direction is None:
             return "That is beside the patches: click on them"
         picture, text = inside.light_from(context.scene, direction)
-        space.image = put(inside.FROM, picture)
+        editor.show(put(inside.FROM, picture))
         return text
-
-
-def _spaces(context: bpy.types.Context) -> list[bpy.types.SpaceImageEditor]:
-    areas = [a for w in context.window_manager.windows for a in w.screen.areas]
-    return [a.spaces.active for a in areas if a.type == "IMAGE_EDITOR"]
 
 
 CLASSES = (ARTO_OT_look_inside, ARTO_OT_light_from)

@@ -8,11 +8,12 @@ from ...core.capture.kinds import Keep
 from ...core.errors import ArtoError
 from ...core.faces import SIDES
 from ...core.units import size
+from ..blender.words import tr
 from ..capture import planes
 from ..settings.table import in_panel
 from ..shot import paths, status
 from ..shot.shot import layer_of
-from .places import Draws, say
+from .places import Draws, say, slot
 from .preferences import research
 
 
@@ -100,12 +101,14 @@ class Storage(Draws):
         else:
             for name, text in (("capture", "Capture"), ("field", "What relighting reads")):
                 found = status.disk(place.source / name)
-                if found:
-                    say(column, context, f"{text}: {size(found)}")
-            if status.unfinished(place.source):
-                column.operator("arto.discard_unfinished", icon="TRASH")
-            if place.folder == place.source and (place.source / "capture").is_dir():
-                column.operator("arto.delete_capture", icon="TRASH")
+                say(column, context, f"{tr(text)}: {size(found) if found else '-'}")
+            row = column.row()
+            row.enabled = bool(status.unfinished(place.source))
+            row.operator("arto.discard_unfinished", icon="TRASH")
+            row = column.row()
+            own = place.folder == place.source
+            row.enabled = own and (place.source / "capture").is_dir()
+            row.operator("arto.delete_capture", icon="TRASH")
         say(column, context, "Folder")
         column.prop(settings, "folder", text="")
         say(column, context, "Relit Picture")
@@ -164,6 +167,6 @@ class Method(Draws):
 def _line(
     column: bpy.types.UILayout, context: bpy.types.Context, found: status.Line | None
 ) -> None:
-    if found:
-        text, serves = found
-        say(column, context, text, "CHECKMARK" if serves else "ERROR")
+    text, serves = found or ("-", False)
+    icon = "CHECKMARK" if serves else "ERROR"
+    slot(column, context, text, icon if found else "NONE")

@@ -1,10 +1,14 @@
 """The operators: hemicube, capture, fit, relight, and those that keep a shot's files."""
 
+# pyright: reportInvalidTypeForm=false
+# Blender reads properties from annotations.
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 
 import bpy
+from bpy.props import StringProperty
 
 from ...core import marked
 from ...core.capture.head import HEADER as CAPTURE_HEADER
@@ -14,7 +18,6 @@ from ...core.files import Lock
 from ..blender.markers import camera_of
 from ..capture import planes
 from ..capture.capture import capture
-from ..capture.check import check_scene
 from ..capture.planned import guess
 from ..capture.sequence import capture_frames
 from ..fit.fit import fit
@@ -23,13 +26,14 @@ from ..plate.names import relit_file
 from ..relight.back import mix_to_scene
 from ..relight.many import frames_of, relight_frames
 from ..relight.relight import relight
-from ..shot import paths
+from ..shot import paths, watch
 from ..shot.adopting import adopt
 from ..shot.shot import layer_of
 from ..stage.bounds import scene_bounds
 from ..stage.stage import stage
 from ..work import Steps
 from ..world.check import check_world, world_of
+from .before import before_capture, check_capture
 from .long_work import LongWork
 
 
@@ -47,6 +51,7 @@ class Quick(bpy.types.Operator):
         raise NotImplementedError
 
     def execute(self, context: bpy.types.Context) -> set[str]:
+        session.dismiss()  # a guest makes way for whatever is pressed
         try:
             self.report({"INFO"}, self.work(context))
         except ArtoError as e:
@@ -141,7 +146,10 @@ class ARTO_OT_capture(LongWork):
         return f"{text}. It takes {guess(context.scene)}"
 
     def check(self, scene: bpy.types.Scene) -> None:
-        check_scene(scene)
+        check_capture(scene)
+
+    def question(self, scene: bpy.types.Scene) -> str:
+        return before_capture(scene)
 
     def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps[object]:
         return capture(scene, view_layer)
@@ -195,7 +203,10 @@ class ARTO_OT_capture_frames(LongWork):
         return can_capture(cls, context)
 
     def check(self, scene: bpy.types.Scene) -> None:
-        check_scene(scene)
+        check_capture(scene)
+
+    def question(self, scene: bpy.types.Scene) -> str:
+        return before_capture(scene)
 
     def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps[object]:
         return capture_frames(scene, view_layer, frames_of(scene))
@@ -246,18 +257,45 @@ def there(cls: type, context: bpy.types.Context, folder: str, name: str, say: st
 
 
 class ARTO_OT_cancel(Quick):
-    """End what ARTO is doing; finished tiles are kept"""
+    """End what ARTO is doing; parts of a capture that are finished are kept"""
 
     bl_idname = "arto.cancel"
     bl_label = "Cancel"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return session.current is not None
+        return session.asked_for() is not None
 
     def work(self, context: bpy.types.Context) -> str:
         session.cancel()
         return "ARTO is stopping"
+
+
+class ARTO_OT_read_message(bpy.types.Operator):
+    """Read all of this message; it then goes away"""
+
+    bl_idname = "arto.read_message"
+    bl_label = "Message"
+
+    text: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+    @classmethod
+    def description(cls, context: bpy.types.Context, properties: object) -> str:
+        return str(getattr(properties, "text", ""))
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        session.forget_outcome()
+        watch.redraw()
+        return context.window_manager.invoke_popup(self, width=400)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        column = self.layout.column(align=True)
+        for line in textwrap.wrap(self.text, 64):
+            column.label(text=line, translate=False)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        session.forget_outcome()
+        return {"FINISHED"}
 
 
 class ARTO_OT_adopt(Quick):
@@ -297,7 +335,7 @@ def remove_capture(folder: Path, place: paths.Place) -> None:
 
 
 class ARTO_OT_discard_unfinished(Removes):
-    """Remove the captures of this shot that were stopped, with their finished tiles"""
+    """Remove the captures of this shot that were stopped, with what is finished of them"""
 
     bl_idname = "arto.discard_unfinished"
     bl_label = "Discard Unfinished"
@@ -340,6 +378,7 @@ CLASSES = (
     ARTO_OT_capture_frames,
     ARTO_OT_relight_frames,
     ARTO_OT_cancel,
+    ARTO_OT_read_message,
     ARTO_OT_adopt,
     ARTO_OT_discard_unfinished,
     ARTO_OT_mix_to_scene,

@@ -50,7 +50,7 @@ def switch(on: bool) -> None:
 def _put_out() -> None:
     bpy.types.SpaceView3D.draw_handler_remove(_handle.pop(), "WINDOW")
     while _maps:
-        _maps.pop().close()
+        _maps.pop().close(wait=False)
     if bpy.app.timers.is_registered(_follow):
         bpy.app.timers.unregister(_follow)
 

@@ -9,7 +9,7 @@ import textwrap
 
 import bpy
 
-from .words import tr
+from ..blender.words import tr
 
 # Space, region, and the end of the names of the panels there.
 SIDEBARS = (
@@ -93,13 +93,51 @@ def say(
         lines.label(text=line, icon=first, translate=False)
 
 
+def sentence(text: str) -> str:
+    """A text in the artist's language, beginning with a capital letter."""
+    text = tr(text)
+    return text[:1].upper() + text[1:]
+
+
+def slot(
+    column: bpy.types.UILayout,
+    context: bpy.types.Context,
+    text: str,
+    icon: str = "NONE",
+    lines: int = 2,
+    whole: bool = False,
+) -> None:
+    """Draw a text in exactly so many lines, whatever its length: nothing below it ever moves.
+
+    A longer text ends with dots. whole: give such a text a button that shows all of it.
+    """
+    row = column.row(align=True)
+    body = row.column(align=True)
+    body.scale_y = 0.8
+    text = tr(text)
+    letters = _letters(context, icon != "NONE") - (4 if whole else 0)
+    found = _lines(text, letters)
+    cut = len(found) > lines
+    if cut:
+        found = found[:lines]
+        found[-1] = found[-1][: letters - 1].rstrip(" ,;:.") + "…"
+    found += [""] * (lines - len(found))
+    for i, line in enumerate(found):
+        first = icon if i == 0 else ("NONE" if icon == "NONE" else "BLANK1")
+        body.label(text=line or " ", icon=first, translate=False)
+    if whole:
+        # there also where nothing was cut: the text goes away once it was read
+        row.operator("arto.read_message", text="", icon="X", emboss=False).text = text
+
+
 def _lines(text: str, letters: int) -> list[str]:
-    """Break a text into lines.
+    """Break a text into lines, also where the text has a new line.
 
     A text without blanks, as in Japanese, is broken anywhere, and its letters count twice.
     """
     wide = any(ord(c) > 0x2E80 for c in text)
-    return textwrap.wrap(text, letters // 2 if wide else letters) or [""]
+    room = letters // 2 if wide else letters
+    return [line for part in text.split("\n") for line in textwrap.wrap(part, room) or [""]]
 
 
 def shortened(context: bpy.types.Context, text: str) -> str:

@@ -6,6 +6,7 @@ import bpy
 
 from ...core import exr
 from ...core.errors import SceneError
+from ..blender.editors import reveal
 from ..plate import compare
 from ..plate.composite import save_composite
 from ..plate.names import relit_file
@@ -14,7 +15,6 @@ from ..plate.verify import verify_plate
 from ..work import Steps
 from .long_work import LongWork
 from .operators import Quick, free
-from .reveal import reveal
 
 
 def _has_plate(cls: type, context: bpy.types.Context) -> bool:

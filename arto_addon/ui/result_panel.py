@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from pathlib import Path
 
@@ -9,7 +10,9 @@ import bpy
 
 from ...core import exr
 from ...core.errors import ArtoError
+from ..blender.words import tr
 from ..job import session
+from ..job.verbs import Verb
 from ..plate.names import relit_file
 from ..plate.verify import verify_file
 from ..relight.light_key import HEADER, light_key
@@ -17,9 +20,10 @@ from ..shot import home, paths, status
 from ..shot.shot import layer_of
 from ..world.check import world_of
 from . import shot_panel, thumbnails
-from .places import Draws, say
-from .words import tr
+from .places import Draws, say, slot
 
+# The jobs of which this panel says how they ended.
+WORKS: tuple[Verb, ...] = ("relight", "relight_frames", "relight_looks", "verify", "composite")
 # Seconds for which the line about the plate is kept: a panel is drawn at every mouse move.
 _HOLDS = 0.4
 _last: dict[str, tuple[float, tuple[str, bool]]] = {}
@@ -83,26 +87,16 @@ class Result(Draws):
         except ArtoError:
             path = None
         if text and path:
-            icon = thumbnails.of_plate(path)
-            if icon:
-                row = column.row()
-                row.alignment = "CENTER"
-                row.template_icon(icon, scale=5.0)
-            say(column, context, text, "CHECKMARK" if good else "ERROR")
+            row = column.row()
+            row.alignment = "CENTER"
+            row.template_icon(thumbnails.of_plate(path), scale=5.0)
         row = column.row(align=True)
         row.scale_y = 1.3
         # the button stands out while the plate is out of date
-        row.alert = bool(text) and not good and session.current is None
+        row.alert = bool(text) and not good and session.asked_for() is None
         row.operator("arto.relight", icon="WORLD")
-        if session.current is None:
-            shot_panel.ended(
-                column,
-                context,
-                ("relight", "relight_frames", "relight_looks", "verify", "composite"),
-            )
+        _said(column, context, text, good)
         if not text:
-            if status.field_line(scene) is None:
-                say(column, context, "Capture the shot first", "INFO")
             return
         row = column.row(align=True)
         row.operator("arto.show_plate", icon="IMAGE_DATA")
@@ -123,22 +117,31 @@ class Result(Draws):
             say(column, context, home.relative(path), "FILE_IMAGE")
 
 
+def _said(column: bpy.types.UILayout, context: bpy.types.Context, text: str, good: bool) -> None:
+    """Draw what is to be said of the plate, in two lines: of the last job, or of the plate."""
+    if shot_panel.ended(column, context, WORKS):
+        return
+    if text:
+        slot(column, context, text, "CHECKMARK" if good else "ERROR")
+    elif status.field_line(context.scene) is None:
+        slot(column, context, "Capture the shot first", "INFO")
+    else:
+        slot(column, context, "")
+
+
 def _seen(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw what the last look inside found."""
+    """Draw what the last look inside found, if it looked at this scene's picture."""
+    if context.window_manager.arto.seen_in != context.scene.name_full:
+        return
     for line in context.window_manager.arto.seen.splitlines():
         say(column, context, line)
 
 
 def _verified(column: bpy.types.UILayout, context: bpy.types.Context, path: Path | None) -> None:
-    """Draw what Verify found, where it verified this plate."""
-    if path is None:
-        return
-    found = verify_file(path)
-    try:
-        if found.stat().st_mtime < path.stat().st_mtime:
-            return
-        text = str(header_of(found).get("arto.verify", ""))
-    except (OSError, ArtoError):
-        return
-    if text:
-        say(column, context, text[0].upper() + text[1:], "INFO")
+    """Draw in two lines what Verify found, where it verified this plate; else what it does."""
+    text = ""
+    with contextlib.suppress(OSError, ArtoError):
+        if path and verify_file(path).stat().st_mtime >= path.stat().st_mtime:
+            text = str(header_of(verify_file(path)).get("arto.verify", ""))
+    text = text[:1].upper() + text[1:] or "Compares the picture with a few samples of a render"
+    slot(column, context, text, "INFO")

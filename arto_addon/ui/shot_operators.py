@@ -4,6 +4,7 @@
 # Blender reads properties from annotations.
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import bpy
@@ -11,7 +12,6 @@ from bpy.props import StringProperty
 
 from ...core.errors import SceneError
 from ...core.files import Lock
-from ..capture.check import check_scene
 from ..relight import looks
 from ..relight.looks import show_looks
 from ..shoot import shoot_and_show
@@ -20,9 +20,10 @@ from ..shot.shot import layer_of
 from ..stage.stage import picture_size
 from ..stage.takes import TAKES, WHOLE
 from ..work import Steps
-from ..world import controls
+from ..world import controls, hdris
 from ..world.check import world_of
 from . import state
+from .before import before_capture, check_capture
 from .long_work import LongWork
 from .operators import Quick, Removes, can_capture, can_relight, free, own_place, remove_capture
 
@@ -43,7 +44,10 @@ class ARTO_OT_shoot(LongWork):
         return can_capture(cls, context)
 
     def check(self, scene: bpy.types.Scene) -> None:
-        check_scene(scene)
+        check_capture(scene)
+
+    def question(self, scene: bpy.types.Scene) -> str:
+        return before_capture(scene)
 
     def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps[object]:
         return shoot_and_show(scene, view_layer)
@@ -103,18 +107,24 @@ class ARTO_OT_open_hdri(Quick):
     bl_options = {"REGISTER", "UNDO"}
 
     filepath: StringProperty(subtype="FILE_PATH")
-    filter_glob: StringProperty(default="*.exr;*.hdr;*.png;*.jpg;*.tif", options={"HIDDEN"})
+    filter_glob: StringProperty(
+        default=";".join(f"*{end}" for end in hdris.ENDINGS), options={"HIDDEN"}
+    )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        # without a name here Blender offers the name of the .blend
+        self.filepath = hdris.folder(context.scene) + os.sep
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def work(self, context: bpy.types.Context) -> str:
         scene = context.scene
+        path = Path(bpy.path.abspath(self.filepath))
+        hdris.check(path)
         try:
-            image = bpy.data.images.load(self.filepath, check_existing=True)
+            image = bpy.data.images.load(str(path), check_existing=True)
         except RuntimeError as e:
-            raise SceneError(f"{self.filepath} cannot be read ({e}): choose an HDRI") from e
+            raise SceneError(f"{path} cannot be read ({e}): choose an HDRI") from e
         world = world_of(scene)
         if world is None:
             world = bpy.data.worlds.new(Path(self.filepath).stem)

@@ -7,6 +7,7 @@ import bpy
 from ...core.capture import kinds
 from ...core.units import clock
 from ..blender.markers import camera_of
+from ..blender.words import tr
 from ..job import session
 from ..job.session import SecondBlender
 from ..job.verbs import Verb
@@ -14,8 +15,7 @@ from ..shot import status
 from ..stage.settings import looks_otherwise, samples_of
 from ..stage.stage import picture_size
 from . import state
-from .places import Draws, say, shortened
-from .words import tr
+from .places import Draws, say, sentence, shortened, slot
 
 _ICONS = {
     "blocked": "ERROR",
@@ -47,23 +47,22 @@ class ShotPanel(Draws):
             width=width,
             height=height,
         )
-        say(column, context, text, "CAMERA_DATA")
+        slot(column, context, text, "CAMERA_DATA", lines=1)
         found = state.told(scene)
-        for i, line in enumerate(found.lines):
-            say(column, context, line, _ICONS[found.kind] if i == 0 else "BLANK1")
+        text, icon = " ".join(tr(line) for line in found.lines), _ICONS[found.kind]
+        caution = status.caution_line(scene)
+        if caution and found.kind == "ready" and len(found.lines) == 1:
+            text, icon = f"{text}. {tr(caution[0])}", "ERROR"
+        slot(column, context, text, icon)
         if scene.render.use_border and found.kind != "blocked":
             say(column, context, "Only the render region is captured", "INFO")
-        if caution := status.caution_line(scene):
-            say(column, context, caution[0], "ERROR")
-        if found.kind == "elsewhere":
-            column.operator("arto.set_back", icon="LOOP_BACK")
-        if found.kind == "other":
-            column.operator("arto.adopt", icon="CHECKMARK")
-        if job := session.current:
+        if job := session.asked_for():
             running(column, context, job)
-            return
-        _buttons(column, context, found)
-        ended(column, context, ("capture", "shoot", "fit", "capture_frames"))
+        else:
+            _buttons(column, context, found)
+        if found.kind != "blocked":
+            for text in looks_otherwise(scene):
+                say(column, context, text, "INFO")
 
 
 def _buttons(column: bpy.types.UILayout, context: bpy.types.Context, found: state.Told) -> None:
@@ -77,44 +76,53 @@ def _buttons(column: bpy.types.UILayout, context: bpy.types.Context, found: stat
     big.scale_y = 1.6
     # the text of the button says what is to be done next
     text = bpy.app.translations.pgettext_iface(found.button, "Operator")
-    big.operator("arto.shoot", text=text, icon="RENDER_STILL", translate=False)
-    if "done" in " ".join(found.lines):
+    # another button beside it leaves no room for an icon
+    beside = {"elsewhere": "arto.set_back", "other": "arto.adopt"}.get(found.kind)
+    icon = "NONE" if beside else "RENDER_STILL"
+    big.operator("arto.shoot", text=text, icon=icon, translate=False)
+    if beside:
+        big.operator(beside)
+    if found.stopped:
         big.operator("arto.discard_unfinished", text="", icon="TRASH")
-    if found.kind == "blocked":
-        return
-    for line in state.price(scene, found.button == "Continue"):
-        say(column, context, line[0].upper() + line[1:])
-    for text in looks_otherwise(scene):
-        say(column, context, text, "INFO")
+    if not ended(column, context, ("capture", "shoot", "fit", "capture_frames")):
+        lines = state.price(scene, found.goes_on) if found.kind != "blocked" else ()
+        slot(column, context, "\n".join(lines))
 
 
 def running(column: bpy.types.UILayout, context: bpy.types.Context, job: SecondBlender) -> None:
     """Draw the progress of a job: a bar, what is being done, and a cross to cancel.
 
-    The bar is as high as the button that it replaces, so that what is below does not jump under the
+    All is as high as what it takes the place of, so that what is below does not jump under the
     mouse.
     """
     column.separator(factor=0.5)
-    column.label(text=shortened(context, session.plain(job.state.text)), translate=False)
+    text = tr(session.plain(job.state.text))
+    if not job.is_of(context.scene):
+        text = f"{job.title}: {text}"
+    column.label(text=shortened(context, text), translate=False)
     row = column.row(align=True)
     row.scale_y = 1.6
     row.progress(factor=job.state.share, text=f"{job.state.share:.0%}")
     row.operator("arto.cancel", text="", icon="X")
-    if job.told:
-        say(column, context, "Stopping")
-    else:
-        say(column, context, tr("{spent} spent", spent=clock(job.spent)))
+    spent = "Stopping" if job.told else tr("{spent} spent", spent=clock(job.spent))
     left = job.state.left
-    say(column, context, " " if left is None else tr("{left} left", left=clock(left)))
+    more = "" if left is None else tr("{left} left", left=clock(left))
+    slot(column, context, f"{spent}\n{more}")
 
 
-def ended(column: bpy.types.UILayout, context: bpy.types.Context, verbs: tuple[Verb, ...]) -> None:
-    """Draw how the last job ended, if its verb is one of these and it failed or was stopped."""
+def ended(column: bpy.types.UILayout, context: bpy.types.Context, verbs: tuple[Verb, ...]) -> bool:
+    """Draw how the last job of the scene ended, if its verb is one of these and it did not succeed.
+
+    Returns whether anything was drawn: two lines.
+    """
     found = session.outcome
     if found is None or found.verb not in verbs or found.level == "INFO":
-        return
+        return False
+    if not found.is_of(context.scene):
+        return False
     icon = {"WARNING": "INFO", "ERROR": "CANCEL"}[found.level]
-    say(column, context, found.text[0].upper() + found.text[1:], icon)
+    slot(column, context, sentence(found.text), icon, whole=True)
+    return True
 
 
 class Quality(Draws):

@@ -89,6 +89,7 @@ class ArtoWindow(bpy.types.PropertyGroup):
         options={"SKIP_SAVE"},
     )
     seen: StringProperty(name="Seen", description="What the last look inside found")
+    seen_in: StringProperty(name="Seen In", description="The scene that was looked into")
 
 
 class ArtoWorld(bpy.types.PropertyGroup):
@@ -96,7 +97,7 @@ class ArtoWorld(bpy.types.PropertyGroup):
 
     rotation: FloatProperty(
         name="Rotation",
-        description="Turn of the HDRI about the vertical, in degrees, counterclockwise from above",
+        description="Turn of the HDRI about the vertical, in degrees, clockwise from above",
         subtype="ANGLE",
         soft_min=-math.pi,
         soft_max=math.pi,

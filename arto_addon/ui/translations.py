@@ -101,6 +101,56 @@ Perhaps {time}, {samples} samples | Vielleicht {time}, {samples} Samples | お�
 Look '{look}', {time} | Stimmung „{look}“, {time} | ルック「{look}」{time}
 {plate}, up to date | {plate}, aktuell | {plate}、最新
 {plate}, light or settings changed since | {plate}, Licht oder Einstellungen seither geändert | {plate}、光か設定が変わりました
+Add Group | Gruppe hinzufügen | グループを追加
+Remove Group | Gruppe entfernen | グループを削除
+Start | Anfang | 開始
+End | Ende | 終了
+Step | Schritt | ステップ
+Data Window | Datenfenster | データウィンドウ
+Prefix | Präfix | 接頭辞
+Painted | Gemalt | ペイント
+Build Hemicube | Hemicube bauen | ヘミキューブを作成
+Remove Hemicube | Hemicube entfernen | ヘミキューブを削除
+Fit | Anpassen | フィット
+Message | Meldung | メッセージ
+Recent HDRIs | Letzte HDRIs | 最近のHDRI
+What relighting reads | Was das Licht braucht | リライトが読むもの
+This Blender was built without Open Image Denoise | Diesem Blender fehlt Open Image Denoise | このBlenderにはOpen Image Denoiseがありません
+The folder cannot be read: | Der Ordner ist nicht lesbar: | フォルダーを読めません:
+Suns: {found} | Sonnen: {found} | 太陽: {found}
+This light has no suns | Dieses Licht hat keine Sonnen | この光に太陽はありません
+Compares the picture with a few samples of a render | Vergleicht das Bild mit wenigen Samples eines Renders | 画像を少数サンプルのレンダーと比べます
+The camera has moved since | Die Kamera hat sich seither bewegt | カメラが動きました
+Captured of the view layer {then}, this is {now} | Aufgenommen vom View-Layer {then}, dies ist {now} | ビューレイヤー {then} でキャプチャ、現在は {now}
+1/{factor} of the size, after {s:.2f} s | 1/{factor} der Größe, nach {s:.2f} s | 1/{factor} サイズ、{s:.2f} 秒後
+Whole, after {s:.2f} s | Ganz, nach {s:.2f} s | 全体、{s:.2f} 秒後
+Whole, without {lacks} | Ganz, ohne {lacks} | 全体、{lacks} なし
+its brightness | seine Helligkeit | 明るさ
+the world behind | die Welt dahinter | 背後のワールド
+the HDRI's suns ({share:.0%} of its light) | die Sonnen des HDRI ({share:.0%} des Lichts) | HDRIの太陽(光の{share:.0%})
+{said}: Relight adds this | {said}: kommt mit Neu beleuchten | {said}: リライトで追加
+{said}: added {time} later | {said}: kommt {time} später | {said}: {time}後に追加
+Finishing, with suns and denoised: {share:.0%} | Wird fertig, mit Sonnen, entrauscht: {share:.0%} | 仕上げ中(太陽、ノイズ除去): {share:.0%}
+Finished: this is the plate | Fertig: dies ist die Plate | 完了: これがプレートです
+The scene has no world any more: add one, and switch Live on again | Die Szene hat keine Welt mehr: eine anlegen und Live wieder einschalten | ワールドがなくなりました: 追加してライブを入れ直してください
+The file has another name now: switch Live on again | Die Datei heißt jetzt anders: Live wieder einschalten | ファイル名が変わりました: ライブを入れ直してください
+The shot was captured anew: switch Live on again | Neu aufgenommen: Live wieder einschalten | 再キャプチャされました: ライブを入れ直してください
+The HDRI is in a node group: turn it there | Das HDRI ist in einer Knotengruppe: dort drehen | HDRIはノードグループの中です: そこで回してください
+The sky is in a node group: turn it there, by its Sun Rotation | Der Himmel ist in einer Knotengruppe: dort die Sonnendrehung ändern | 空はノードグループの中です: そこで太陽の回転を変えてください
+The world mixes a sky and HDRIs: turn them one by one | Die Welt mischt Himmel und HDRIs: einzeln drehen | 空とHDRIが混ざっています: 個別に回してください
+The world has no HDRI or sky: it is the same from every side | Die Welt hat kein HDRI und keinen Himmel: sie ist von allen Seiten gleich | HDRIも空もありません: どこから見ても同じです
+The HDRI is turned by nodes of its own: turn it there | Das HDRI wird von eigenen Knoten gedreht: dort drehen | HDRIは専用ノードで回っています: そこで回してください
+The world's HDRIs are turned one by one: turn them there | Die HDRIs werden einzeln gedreht: dort drehen | HDRIは個別に回っています: そこで回してください
+The world is linked from a library: make it local to change it | Die Welt ist verlinkt: zum Ändern lokal machen | ワールドはリンクです: ローカルにしてください
+Your render clamps direct light at {}; the relit picture does not | Dein Render begrenzt direktes Licht auf {}; das neu beleuchtete Bild nicht | レンダーは直接光を {} で制限、リライトはしません
+Your render clamps at {}; the relit picture does not | Dein Render begrenzt auf {}; das neu beleuchtete Bild nicht | レンダーは {} で制限、リライトはしません
+Your render uses Fast GI; the relit picture has all its bounces | Dein Render nutzt Fast GI; das neu beleuchtete Bild hat alle Sprünge | レンダーはFast GI、リライトは全バウンスです
+Your render shows the film through glass; the relit picture shows the world | Dein Render zeigt durch Glas den Film; das neu beleuchtete Bild die Welt | レンダーはガラス越しにフィルム、リライトはワールドを見せます
+Your render burns metadata into the picture; the relit picture does not | Dein Render brennt Metadaten ein; das neu beleuchtete Bild nicht | レンダーはメタデータを焼き込み、リライトはしません
+Your render shows the sequencer; the relit picture shows the scene | Dein Render zeigt den Sequencer; das neu beleuchtete Bild die Szene | レンダーはシーケンサー、リライトはシーンを見せます
+cancelled: parts that were finished are kept | abgebrochen: fertige Teile bleiben | 中止: 完了した部分は残ります
+cancelled: nothing was changed | abgebrochen: nichts wurde geändert | 中止: 変更はありません
+This takes the place of a capture of {more} samples, by {fewer}: it is lost then | Dies ersetzt eine Aufnahme von {more} Samples durch {fewer}: sie ist dann verloren | {more} サンプルのキャプチャを {fewer} で置き換えます: 元には戻せません
 {plate}, of an earlier capture | {plate}, von früherer Aufnahme | {plate}、以前のキャプチャ
 """
 

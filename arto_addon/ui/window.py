@@ -1,4 +1,4 @@
-"""What the window does besides buttons: show a finished job's result, end a job at ESC."""
+"""What the window does besides buttons: show a finished job's result, and tidy up."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 from bpy.app.handlers import persistent
 
+from ..blender.editors import reveal
 from ..job import session, snapshot
 from ..job.session import SecondBlender
 from ..job.verbs import Verb
@@ -24,9 +25,7 @@ from ..shot import paths
 from ..shot.shot import layer_of
 from ..shot.status import field_of
 from ..world import own
-from .reveal import reveal
-
-_keys: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
+from . import overlay
 
 
 def _scene_of(job: SecondBlender) -> bpy.types.Scene | None:
@@ -42,7 +41,7 @@ def show_relit(job: SecondBlender) -> str:
     if scene is None:
         return f"wrote {path} (its scene is not open any more)"
     window = bpy.context.window_manager.windows[0]
-    wanted = live.wrote(path)
+    wanted = live.wrote(scene)
     with bpy.context.temp_override(window=window):
         if job.verb == "relight_frames":
             image = present_frames(scene, path, frames_of(scene), job.light)
@@ -107,6 +106,15 @@ def _before_save(*_: object) -> None:
             live.current._wished = None
 
 
+@persistent
+def _another_file(*_: object) -> None:
+    """Let go of what was said and drawn of the file that was open."""
+    session.forget_outcome()
+    bpy.context.window_manager.arto.seen = ""
+    overlay.switch(False)
+    compare.forget()
+
+
 _FINISHERS: dict[Verb, Callable[[SecondBlender], str]] = {
     "relight": show_relit,
     "relight_frames": show_relit,
@@ -120,24 +128,17 @@ _FINISHERS: dict[Verb, Callable[[SecondBlender], str]] = {
 
 def register() -> None:
     session.finishers.update(_FINISHERS)
-    live.reveal = reveal
     if not bpy.app.background:
         bpy.app.handlers.save_pre.append(_before_save)
-    keys = bpy.context.window_manager.keyconfigs.addon
-    if keys:  # without a window there is no key configuration
-        # the window's keymap is asked last, so that anything else that uses ESC comes first
-        keymap = keys.keymaps.new(name="Window", space_type="EMPTY")
-        _keys.append((keymap, keymap.keymap_items.new("arto.cancel", "ESC", "PRESS")))
+        bpy.app.handlers.load_post.append(_another_file)
 
 
 def unregister() -> None:
     for verb in _FINISHERS:
         session.finishers.pop(verb, None)
     compare.forget()
-    live.reveal = None
+    if _another_file in bpy.app.handlers.load_post:
+        bpy.app.handlers.load_post.remove(_another_file)
     if _before_save in bpy.app.handlers.save_pre:
         bpy.app.handlers.save_pre.remove(_before_save)
         put_away(name_of(bpy.context.scene), *OURS)
-    while _keys:
-        keymap, item = _keys.pop()
-        keymap.keymap_items.remove(item)

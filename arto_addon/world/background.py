@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
-
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +11,7 @@ from ...core.capture.names import combined
 from ...core.region import Region
 from ..blender.output import float_exr, write_to
 from ..blender.reached import reached
+from ..blender.scratch import temporary
 from ..shot.shot import layer_of
 from ..stage.bounds import rendered
 from ..stage.settings import prepare
@@ -51,8 +49,8 @@ def _set(on: Stage, world: bpy.types.World, region: Region, even: bool) -> None:
 
 
 def _render(on: Stage) -> dict[str, NDArray]:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "behind.exr"
+    with temporary() as folder:
+        path = folder / "behind.exr"
         write_to(on.scene.render, path)
         request = Render(on.scene.name, 0, "world")
         blocking_render(request)

@@ -12,27 +12,21 @@ from collections.abc import Sequence
 import bpy
 
 from ..blender.nodes import shader_tree, world_of_nodes
-from .dials import backgrounds, put_in_scaler, put_in_turner, scaler, turner, why_not_turned
+from .dials import backgrounds, put_in_scaler, scaler, turn, turn_to, why_not_turned
+
+__all__ = ["turn"]
 
 # The name of the node that `set_tint` adds.
 TINT = "ARTO Tint"
 
 
-def turn(world: bpy.types.World) -> float:
-    """The rotation of a world about the vertical, in radians."""
-    node = turner(world)
-    return node.inputs["Rotation"].default_value[2] if node else 0.0
-
-
 def set_turn(world: bpy.types.World, angle: float) -> None:
-    """Turn a world to an angle in radians; a mapping node is added where there is none.
+    """Turn a world to an angle in radians, by its own nodes or by one that is added.
 
     Nothing happens to a world that cannot be turned (`why_not_turned`).
     """
-    if why_not_turned(world):
-        return
-    node = turner(world) or put_in_turner(world)
-    node.inputs["Rotation"].default_value[2] = angle
+    if not why_not_turned(world):
+        turn_to(world, angle)
 
 
 def strength(world: bpy.types.World) -> float:

@@ -24,6 +24,8 @@ from .still import still
 TURN, STRENGTH, PLACE = "ARTO Turn", "ARTO Strength", "ARTO Place"
 # Nodes that show a picture by direction.
 _PICTURES = {"ShaderNodeTexEnvironment", "ShaderNodeTexSky"}
+# The kinds of skies that are turned by the direction that is looked up.
+_BY_VECTOR = ("PREETHAM", "HOSEK_WILKIE")
 # Nodes after which a mapping node can be added.
 _SOURCES = {"ShaderNodeTexCoord", "ShaderNodeMapping", "ShaderNodeNewGeometry"}
 
@@ -38,7 +40,15 @@ def _pictures(world: bpy.types.World) -> list[bpy.types.Node]:
     """The nodes of a world's own tree that show a picture by direction and have a socket Vector."""
     tree = shader_tree(world)
     found = [n for n in tree.nodes if n.bl_idname in _PICTURES] if tree else []
-    return [n for n in found if "Vector" in n.inputs and not n.inputs["Vector"].is_unavailable]
+    return [n for n in found if getattr(n, "sky_type", _BY_VECTOR[0]) in _BY_VECTOR]
+
+
+def _skies(world: bpy.types.World) -> list[bpy.types.Node]:
+    """The skies of a world's own tree that turn by their Sun Rotation: without a socket Vector."""
+    tree = shader_tree(world)
+    found = [n for n in tree.nodes if n.bl_idname == "ShaderNodeTexSky"] if tree else []
+    found = [n for n in found if n.sky_type not in _BY_VECTOR]
+    return [n for n in found if any(o.is_linked for o in n.outputs)]
 
 
 def _groups(world: bpy.types.World) -> list[bpy.types.Node]:
@@ -89,12 +99,17 @@ def why_not_turned(world: bpy.types.World) -> str:
     """Say why a world cannot be turned, for a grey slider; empty where it can be turned."""
     if world.library:
         return "The world is linked from a library: make it local to change it"
-    if turner(world) is not None:
+    pictures, skies = _pictures(world), _skies(world)
+    if skies and pictures:
+        return "The world mixes a sky and HDRIs: turn them one by one"
+    if skies or turner(world) is not None:
         return ""
-    pictures = _pictures(world)
     if not pictures:
-        if _groups(world):
-            return "The HDRI is in a node group: turn it there"
+        if groups := _groups(world):
+            found = [n for group in groups for t in trees(group.node_tree, set()) for n in t.nodes]
+            if any(node.bl_idname == "ShaderNodeTexEnvironment" for node in found):
+                return "The HDRI is in a node group: turn it there"
+            return "The sky is in a node group: turn it there, by its Sun Rotation"
         return "The world has no HDRI or sky: it is the same from every side"
     sources = {_source(picture) for picture in pictures}
     if any(kind not in _SOURCES for kind, _, _ in sources):
@@ -138,6 +153,29 @@ def put_in_turner(world: bpy.types.World) -> bpy.types.Node:
     for picture in pictures:
         tree.links.new(node.outputs[0], picture.inputs["Vector"])
     return node
+
+
+def turn(world: bpy.types.World) -> float:
+    """The rotation of a world about the vertical, in radians, clockwise from above."""
+    if skies := _skies(world):
+        return skies[0].sun_rotation
+    node = turner(world)
+    return node.inputs["Rotation"].default_value[2] if node else 0.0
+
+
+def turn_to(world: bpy.types.World, angle: float) -> None:
+    """Turn a world to an angle in radians; `why_not_turned` must be empty.
+
+    A sky turns by its Sun Rotation, several skies by as much as the first. Pictures turn by a
+    mapping node, which is added where there is none.
+    """
+    if skies := _skies(world):
+        more = angle - skies[0].sun_rotation
+        for sky in skies:
+            sky.sun_rotation += more
+        return
+    node = turner(world) or put_in_turner(world)
+    node.inputs["Rotation"].default_value[2] = angle
 
 
 def scaler(world: bpy.types.World) -> bpy.types.NodeSocket | None:
@@ -270,6 +308,5 @@ def turned(
                 f"the world '{world.name}' cannot be turned ({why[0].lower()}{why[1:]}): add one "
                 "Mapping node before its texture, or give maps by --worlds"
             )
-        node = turner(copy) or put_in_turner(copy)
-        node.inputs["Rotation"].default_value[2] += angle
+        turn_to(copy, turn(copy) + angle)
         yield copy

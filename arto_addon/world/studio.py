@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -13,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...core import exr
 from ..blender.output import float_exr, write_to
+from ..blender.scratch import temporary
 from ..work import Render, blocking_render
 
 # Cycles' settings that change how textures and shaders look.
@@ -67,8 +66,8 @@ def studio_scene(
 
 def render(studio: bpy.types.Scene) -> NDArray[np.float32]:
     """Render a studio scene -> (H, W, 4) float32, rows top-down. Raises CancelledError."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "picture.exr"
+    with temporary() as folder:
+        path = folder / "picture.exr"
         write_to(studio.render, path)
         request = Render(studio.name, 0, "world")
         blocking_render(request)

@@ -60,6 +60,7 @@ class CaptureHead:
     height, width : of the whole picture, in pixels.
     tiles : what is rendered of it.
     key : of all that decides the images, the same for the very same capture alone.
+    asked : of the settings alone that it was asked for with, to tell quickly what goes on with it.
     samples : of each pixel, all seeds together. 0 where the set was rendered without noise.
     seed : of the noise.
     route : how patches and patterns were told apart.
@@ -92,6 +93,7 @@ class CaptureHead:
     width: int
     tiles: tuple[TileEntry, ...] = ()
     key: str | None = None
+    asked: str | None = None
     samples: float | None = None
     seed: int | None = None
     route: Route | None = None
@@ -169,6 +171,7 @@ class CaptureHead:
             width=width,
             tiles=tuple(tiles),
             key=said.some_text("key"),
+            asked=said.some_text("asked"),
             samples=said.real("samples", 0, MOST_SAMPLES),
             seed=said.count("seed", 0, LARGEST_SEED),
             route=said.one_of("route", Route),
@@ -301,6 +304,12 @@ class CaptureHead:
 
 
 # What `read` checks and `to_json` writes that is no value of its own.
+# In the order in which files have them.
+_IN_ORDER = (
+    "key", "asked", "samples", "seed", "route", "grain", "adaptive", "far", "blender",
+    "colour_space", "film_transparent", "changed", "catchers", "take", "kept", "choice", "separate",
+    "scene", "file", "view_layer", "shot", "frame", "fingerprint",
+)  # fmt: skip
 _WRITTEN = ("format", "version", "patches", "pattern_polynomials")
 # Values that `to_json` writes in places of their own; the others are written where they are known.
 _APART = {

@@ -285,9 +285,16 @@ def test_an_unfinished_capture_goes_on(tmp_path) -> None:
     # what is left costs as much for each pixel as the first tile did
     (header,) = paths.place(scene).source.glob("unfinished-*/capture.json")
     head = status.capture_at(header).head
-    seconds, known = state._seconds(scene, 320 * 240, unfinished=True)
+    seconds, known = state._seconds(scene, 320 * 240, head)
     left = 320 * 240 / head.tiles[0].region.pixels - 1
     assert known and seconds == pytest.approx(state.OTHERS + left * head.seconds)
+    # of another quality, or of another scene, another one would begin
+    scene.arto.samples = 2
+    assert (state.told(scene).button, state.told(scene).stopped) == ("Capture", True)
+    scene.arto.samples = 1
+    assert state.told(scene).button == "Continue"
+    bpy.data.materials["Matt"].node_tree.nodes["Principled BSDF"].inputs[2].default_value = 0.9
+    assert state.told(scene).button == "Capture"
 
 
 def test_a_built_hemicube_can_be_seen_and_is_the_one_that_captures(tmp_path) -> None:

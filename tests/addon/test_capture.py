@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from arto.arto_addon.capture import planned
+from arto.arto_addon.capture.plan import kept_often
 from arto.arto_addon.stage.stage import picture_region
 from arto.core import exr
 from arto.core.capture.names import GROUP
@@ -117,6 +118,26 @@ def test_tiles_fit_the_budget(scene):
     assert all(t.height * 2000 * 488 * 24 <= 256 * 2**20 for t in tiles)
     with pytest.raises(SceneError, match="memory budget"):
         planned.tiles_of(region(0, 0, 100000, 10), 9008 * 24, 16 << 20)
+
+
+def test_work_is_kept_every_minute(scene):
+    """Whatever the picture's size: a cross, a crash or a quit costs a minute and no more."""
+    region = type(picture_region(scene))
+    for whole, minutes in (
+        (region(0, 0, 240, 180), 22),
+        (region(7, 3, 96, 333), 40),
+        (region(0, 0, 1920, 1080), 45),
+    ):
+        tiles = kept_often([whole], whole, 60.0 * minutes, 1.0)
+        assert sum(t.height for t in tiles) == whole.height and tiles[0].y == whole.y
+        assert all(a.y + a.height == b.y for a, b in itertools.pairwise(tiles))
+        assert all(t.y % 8 == 0 for t in tiles[1:]), "a proxy's pixel is of one tile"
+        assert max(t.pixels for t in tiles) / whole.pixels * minutes <= 1.0
+    # what is quick stays whole, and what is long to get ready is not cut to pieces
+    assert kept_often([whole], whole, 44.0, 1.0) == [whole]
+    assert 3 <= len(kept_often([whole], whole, 600.0, 30.0)) <= 4
+    # a relight holds a file for each strip
+    assert 40 <= len(kept_often([whole], whole, 1e6, 1.0)) <= 60
 
 
 def test_render_region(tmp_path):

@@ -63,6 +63,33 @@ def test_turn_of_a_world_without_a_mapping_node(scene) -> None:
     np.testing.assert_allclose(_baked(scene), before, atol=0.01 * before.max())
 
 
+def test_a_sky_turns_by_its_sun(scene) -> None:
+    """As an HDRI does, to the same side; and what is seen is the light that is captured by it."""
+    tree = scene.world.node_tree
+    sky = tree.nodes.new("ShaderNodeTexSky")
+    sky.sky_type = sky.bl_rna.properties["sky_type"].enum_items[0].identifier
+    sky.sun_disc, sky.sun_rotation = False, 0.4
+    assert dials.why_not_turned(scene.world)  # it leads nowhere
+    tree.links.new(sky.outputs[0], tree.nodes["Background"].inputs["Color"])
+    assert not dials.why_not_turned(scene.world)
+    assert scene.world.arto.rotation == pytest.approx(0.4)
+    before, count = _baked(scene), len(tree.nodes)
+    scene.world.arto.rotation = 0.4 + math.pi / 2
+    assert sky.sun_rotation == pytest.approx(0.4 + math.pi / 2) and len(tree.nodes) == count
+    expected = np.roll(before, WIDTH // 4, axis=1)
+    np.testing.assert_allclose(_baked(scene), expected, atol=0.03 * before.max())
+    with dials.turned(scene.world, 0.5) as turned:
+        assert dials.turn(turned) == pytest.approx(0.9 + math.pi / 2)
+    texture = _texture(scene.world, linked=False)
+    assert "mixes a sky" in dials.why_not_turned(scene.world)
+    tree.nodes.remove(texture)
+    group = bpy.data.node_groups.new("Sky", "ShaderNodeTree")
+    group.nodes.new("ShaderNodeTexSky")
+    tree.nodes.remove(sky)
+    tree.nodes.new("ShaderNodeGroup").node_tree = group
+    assert "by its Sun Rotation" in dials.why_not_turned(scene.world)
+
+
 def test_an_own_mapping_node_is_used(scene) -> None:
     world = scene.world
     texture = _texture(world)

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import threading
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from arto.arto_addon import work
 from arto.arto_addon.capture import capture, planned, room
+from arto.arto_addon.capture.planned import doubts, least, most
 from arto.arto_addon.fit import fit
 from arto.arto_addon.relight import relight
 from arto.arto_addon.shot import paths
 from arto.arto_addon.stage import small
 from arto.arto_addon.stage.stage import Pace
+from arto.arto_addon.ui.before import check_capture
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import CaptureSetError, PatternError, SceneError
 from arto.core.field.field import Field
@@ -221,3 +224,30 @@ def test_the_button_says_what_a_capture_may_take(tmp_path):
     scene.arto.memory = 16
     scene.render.resolution_x = 16384
     assert "a single row of the picture takes" in planned.guess(scene)
+
+
+def test_a_full_disk_is_told_at_the_click(tmp_path, monkeypatch) -> None:
+    """Before a job starts: refused where nothing fits, asked where not everything may."""
+    scene = small_scene(tmp_path)
+    scene.arto.adaptive = True
+    free = {"disk": 1 << 50, "memory": 1 << 40}
+    monkeypatch.setattr(
+        room.shutil, "disk_usage", lambda _: SimpleNamespace(total=0, used=0, free=free["disk"])
+    )
+    monkeypatch.setattr(room, "memory", lambda: (1 << 40, free["memory"]))
+    folder = paths.place(scene).folder
+    check_capture(scene)
+    assert not doubts(scene, folder)
+    least_of, most_of = least(scene), most(scene)
+    assert least_of.disk < most_of.disk and least_of.memory < most_of.memory
+    for kind, low, high in (
+        ("disk", least_of.disk, most_of.disk),
+        ("memory", least_of.memory, most_of.memory),
+    ):
+        free[kind] = (low + high) // 2
+        check_capture(scene)
+        assert f"of {kind}" in doubts(scene, folder)
+        free[kind] = low // 2
+        with pytest.raises(SceneError, match=f"of {kind}"):
+            check_capture(scene)
+        free[kind] = 1 << 50

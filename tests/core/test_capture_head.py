@@ -199,6 +199,7 @@ IMPOSSIBLE: dict[str, list[Any]] = {
     "width": [0, -1, 1.5, 10**9, True],
     "tiles": [{}, [3], [{}], [{"region": [0, 0, 24, 18], "files": [], "done": "yes"}]],
     "key": ["x" * 40_000],
+    "asked": ["x" * 40_000, 3],
     "samples": [-1, -0.5, 10**400, True, "64", 1e300],
     "seed": [-1, 2**31, 0.5, False],
     "route": ["", "All", "none"],

@@ -1,0 +1,38 @@
+"""What the artist is told of a live picture, in a line: its size, and what it lacks."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...core.units import clock
+from ..blender.words import tr
+from .viewer import Drawn
+
+FINISHED_LINE = "Finished: this is the plate"
+# Seconds that finishing takes, until it was measured.
+GUESS = 5.0
+
+
+def lacking(scene: bpy.types.Scene, held: bool, behind: bool, suns: float) -> list[str]:
+    """What a live picture of full size lacks and a relight adds, in words.
+
+    held: whether its brightness is that of a render only after a relight; behind: whether it has
+    the world behind the things; suns: the share of the light of suns, 0 for none.
+    """
+    lacks = [tr("its brightness")] if held else []
+    lacks += [] if behind else [tr("the world behind")]
+    if suns and scene.arto.lamps:
+        lacks.append(tr("the HDRI's suns ({share:.0%} of its light)", share=suns))
+    return lacks
+
+
+def line(scene: bpy.types.Scene, shown: Drawn, lacks: list[str], took: float | None) -> str:
+    """The line. lacks: see `lacking`; took: how long the last finishing took, in seconds."""
+    if shown.factor > 1:
+        return tr("1/{factor} of the size, after {s:.2f} s", factor=shown.factor, s=shown.latency)
+    if not lacks:
+        return tr("Whole, after {s:.2f} s", s=shown.latency)
+    said = tr("Whole, without {lacks}", lacks=", ".join(lacks))
+    if not scene.arto.live_finish:
+        return tr("{said}: Relight adds this", said=said)
+    return tr("{said}: added {time} later", said=said, time=clock(took or GUESS))
