@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import shutil
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from program_tools import Program
-from walk_tools import ARRANGE, TAB, Walk
+from walk_tools import ARRANGE, TAB, WATCH, Walk
 from window_tools import ended, windows
 
 
@@ -132,3 +133,15 @@ def test_what_the_buttons_show(walk: Walk) -> None:
     assert np.abs(plate - render).max() > 20  # the two can be told apart
     quarter = plate.shape[1] // 4
     assert np.abs(side[:, :half] - plate[:, quarter : quarter + half]).mean() < 12
+
+    # left alone, nothing of ours is called or drawn
+    w.do(WATCH)
+    w.do("[a.tag_redraw() for a in bpy.context.window_manager.windows[0].screen.areas]")
+    w.wait("counts.get('ShotPanel')")
+    time.sleep(2)
+    w.do("counts.clear()")
+    before, begun = w.seconds, time.monotonic()
+    time.sleep(10)
+    assert w.get("counts") == {}
+    # of a core; Blender itself takes up to 2%, and the test's own questions some
+    assert (w.seconds - before) / (time.monotonic() - begun) < 0.1

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from arto.core import exr
 from program_tools import ROOT, Program, said
-from walk_tools import ARRANGE, TAB, Walk
+from walk_tools import ARRANGE, TAB, WATCH, Walk
 from window_tools import windows
 
 OLD = Path(os.environ.get("ARTO_SCENES") or ROOT.parent / "shared" / "scenes")
@@ -70,6 +70,7 @@ def test_an_hour_of_an_artist(walk: Walk, tmp_path: Path, program: Program) -> N
     w.do(ARRANGE)
     w.wait(TAB)
     w.do(BEGIN)
+    w.do(WATCH)
     state = MODULE.format("ui.state")
     assert w.get(f"{state}.told(bpy.context.scene).lines[0]") == "No capture yet"
     walk.shot("an_old_file")
@@ -183,6 +184,9 @@ def test_an_hour_of_an_artist(walk: Walk, tmp_path: Path, program: Program) -> N
     level, text = w.idle()
     assert level == "INFO", text
     assert (tmp_path / "old_Scene_Look_composite.png").is_file()
+
+    # no call of ours has held up the window
+    assert not w.get("slow")
 
     # off and on again, save, close, open: all is there
     w.do(TOGGLE)

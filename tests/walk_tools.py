@@ -28,6 +28,61 @@ for area in screen.areas:
         area.spaces.active.context = "RENDER"
 """
 TAB = "tab('VIEW_3D')"
+# Counts the calls of ARTO's timers, handlers and panels, and keeps those that held up the window
+# for more than 50 ms: of the window's own thread, whatever else the machine does. What Blender
+# itself takes for saving a copy of the file is not counted.
+WATCH = """
+import functools, sys, time
+slow, counts, saving = [], {}, [0.0]
+
+
+def watched(name, call):
+    @functools.wraps(call)
+    def inner(*a, **k):
+        begun, saved = time.thread_time(), saving[0]
+        try:
+            return call(*a, **k)
+        finally:
+            spent = time.thread_time() - begun - (saving[0] - saved)
+            counts[name] = counts.get(name, 0) + 1
+            if spent > 0.05:
+                slow.append((name, round(spent, 3)))
+    return inner
+
+
+def module(end):
+    return next(m for n, m in sys.modules.items() if n.endswith(".arto_addon." + end))
+
+
+def watch_for_waits():
+    for end, names in {
+        "live.live": ("_tick",), "job.session": ("_follow",), "ui.overlay": ("_follow",),
+        "shot.watch": ("_look", "_await_pixels"),
+    }.items():
+        for name in names:
+            setattr(module(end), name, watched(f"{end}.{name}", getattr(module(end), name)))
+    for kind in dir(bpy.app.handlers):
+        handlers = getattr(bpy.app.handlers, kind)
+        for i, call in enumerate(handlers if isinstance(handlers, list) else ()):
+            if ".arto_addon." in call.__module__:
+                handlers[i] = watched(f"{kind} {call.__module__}", call)
+    for panel in module("ui.places").Draws.__subclasses__():
+        panel.draw_column = staticmethod(watched(panel.__name__, panel.draw_column))
+    snapshot = module("job.snapshot")
+    take = snapshot.take
+
+    def timed(*a, **k):
+        begun = time.thread_time()
+        try:
+            return take(*a, **k)
+        finally:
+            saving[0] += time.thread_time() - begun
+
+    snapshot.take = timed
+
+
+watch_for_waits()
+"""
 
 
 class Walk:

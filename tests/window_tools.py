@@ -257,6 +257,12 @@ class Window:
         return [found] if found else []
 
     @property
+    def seconds(self) -> float:
+        """The seconds of a core that the window has taken so far."""
+        fields = Path(f"/proc/{self.process.pid}/stat").read_text().rsplit(")", 1)[1].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+    @property
     def alive(self) -> bool:
         return self.process.poll() is None
 
