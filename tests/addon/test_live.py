@@ -137,6 +137,23 @@ def test_a_world_that_cannot_light_is_said(scene, on) -> None:
     assert not on.trouble
 
 
+def test_live_ends_with_what_it_was_on_for(scene, on) -> None:
+    """The file saved as another, and the world that is gone, each with a sentence."""
+    _rest(on)
+    on.blend = "/elsewhere/other.blend"
+    with pytest.raises(SceneError, match="another name now"):
+        on.tick()
+    on.blend = bpy.data.filepath
+    world, scene.world = scene.world, None
+    try:
+        on.dirty = True
+        with pytest.raises(SceneError, match="no world any more"):
+            on.tick()
+    finally:
+        scene.world = world
+    assert on.tick()
+
+
 def test_the_newest_wish_wins(on) -> None:
     """Of a thousand wishes at once few are begun, and the last one is shown."""
     image = np.ones((64, 128, 3), np.float32)
