@@ -59,8 +59,7 @@ class CaptureHead:
     hemicube, patterns : what was lit, with what.
     height, width : of the whole picture, in pixels.
     tiles : what is rendered of it.
-    key : of all that decides the images, the same for the very same capture alone.
-    asked : of the settings alone that it was asked for with, to tell quickly what goes on with it.
+    key, asked : digests of all that decides the images, and of the artist's settings alone.
     samples : of each pixel, all seeds together. 0 where the set was rendered without noise.
     seed : of the noise.
     route : how patches and patterns were told apart.
@@ -82,8 +81,7 @@ class CaptureHead:
     seconds : that rendering took, so far.
     pair : of a take beside the first, the key of the first.
     behind : whether the images have a layer of what the camera sees of the world behind.
-    portals : whether what Ray Portals show of the world is in the light of the patches; None where
-        the scene has none.
+    portals : whether the light of the patches has what Ray Portals show; None for none.
     others : what the file says beside that; it is written again.
     """
 
