@@ -61,8 +61,7 @@ class CaptureHead:
     tiles : what is rendered of it.
     key, asked : digests of all that decides the images, and of the artist's settings alone.
     samples : of each pixel, all seeds together. 0 where the set was rendered without noise.
-    seed : of the noise.
-    route : how patches and patterns were told apart.
+    seed, route : of the noise; how patches and patterns were told apart.
     radiance : of the patches where a pattern is 1, in the files; 1 where it is not said.
     grain : whether each patch has an image more that shows its noise.
     adaptive : whether the patches are as fine as the scene needs them.

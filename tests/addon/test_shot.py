@@ -170,18 +170,18 @@ def test_a_second_scene_renames_no_plate(tmp_path):
     save(tmp_path)
     for output in ("", str(tmp_path / "plates" / "sh010")):
         scene.arto.output = output
-        before = paths.relit_file(scene), plate.name_of(scene)
+        before = relit_file(scene), plate.name_of(scene)
         others = [scene.copy(), bpy.data.scenes.new("Other")]
         others[1].arto.output, others[1].arto.folder = output, scene.arto.folder
-        assert (paths.relit_file(scene), plate.name_of(scene)) == before
-        found = {paths.relit_file(s) for s in bpy.data.scenes}
+        assert (relit_file(scene), plate.name_of(scene)) == before
+        found = {relit_file(s) for s in bpy.data.scenes}
         assert len(found) == len({plate.name_of(s) for s in bpy.data.scenes}) == 3
         scene_id.give(others[1])
-        named = paths.relit_file(others[1])
+        named = relit_file(others[1])
         bpy.data.scenes.remove(others[0])
-        assert paths.relit_file(others[1]) == named
+        assert relit_file(others[1]) == named
         bpy.data.scenes.remove(others[1])
-        assert (paths.relit_file(scene), plate.name_of(scene)) == before
+        assert (relit_file(scene), plate.name_of(scene)) == before
 
 
 def test_pairs_that_read_alike_are_two(tmp_path):
