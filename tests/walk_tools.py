@@ -64,7 +64,7 @@ def watch_for_waits():
     for kind in dir(bpy.app.handlers):
         handlers = getattr(bpy.app.handlers, kind)
         for i, call in enumerate(handlers if isinstance(handlers, list) else ()):
-            if ".arto_addon." in call.__module__:
+            if ".arto_addon." in (getattr(call, "__module__", "") or ""):
                 handlers[i] = watched(f"{kind} {call.__module__}", call)
     for panel in module("ui.places").Draws.__subclasses__():
         panel.draw_column = staticmethod(watched(panel.__name__, panel.draw_column))
