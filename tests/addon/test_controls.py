@@ -78,7 +78,7 @@ def test_a_sky_turns_by_its_sun(scene) -> None:
     assert sky.sun_rotation == pytest.approx(0.4 + math.pi / 2) and len(tree.nodes) == count
     expected = np.roll(before, WIDTH // 4, axis=1)
     np.testing.assert_allclose(_baked(scene), expected, atol=0.03 * before.max())
-    with dials.turned(scene.world, 0.5) as turned:
+    with dials.turned(scene, scene.view_layers[0].name, scene.world, 0.5) as turned:
         assert dials.turn(turned) == pytest.approx(0.9 + math.pi / 2)
     texture = _texture(scene.world, linked=False)
     assert "mixes a sky" in dials.why_not_turned(scene.world)
