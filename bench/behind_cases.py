@@ -267,13 +267,3 @@ def negative_part_of_a_world(scene):
     tree.links.new(lit.outputs[0], both.inputs[0])
     tree.links.new(less, both.inputs[1])
     tree.links.new(both.outputs[0], tree.get_output_node("CYCLES").inputs["Surface"])
-
-
-@case()
-def negative_world(scene):
-    tree = scene.world.node_tree
-    lit = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeBackground")
-    lit.inputs["Strength"].default_value *= -0.3
-    lamp = bpy.data.lights.new("lamp", "AREA")
-    lamp.energy, lamp.size = 600, 2
-    add_aimed(scene, lamp, place=(3, -3, 5), target=(0, 0, 0.5))
