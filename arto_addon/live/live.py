@@ -29,7 +29,7 @@ from ..job import session
 from ..plate.names import relit_file
 from ..plate.plate import name_of
 from ..relight.light_key import HEADER, light_key
-from ..relight.shown import Shown
+from ..relight.shown import Shown, check_film
 from ..shot import watch
 from ..shot.shot import check_same_shot, layer_of
 from ..stage.stage import picture_size
@@ -66,6 +66,7 @@ class Live:
         check_world(scene, self.layer)
         shown = Shown(scene, self.layer)
         check_same_shot(scene, shown.field.about.shot, "the reflectance field", self.layer)
+        check_film(scene, shown.field)
         self.folder = shown.field.folder
         self.written = (self.folder / "field.json").stat().st_mtime_ns
         fields = [take.field for take in shown.takes]
