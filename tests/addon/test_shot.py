@@ -17,7 +17,7 @@ from arto.arto_addon.fit import fit
 from arto.arto_addon.plate import plate
 from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.plate.verify import verify_file
-from arto.arto_addon.relight import many
+from arto.arto_addon.relight import ahead
 from arto.arto_addon.shot import paths, scene_id, status
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import BusyError, CaptureSetError, ShotError
@@ -284,7 +284,7 @@ def test_no_look_is_written_over_what_stands_beside_a_plate(scene, tmp_path, nam
         plates = [relit_file(scene, look) for look in ("", other, name, f"{name}~x")]
         kinds = (plate.layers_file, plate.share_file, plate.light_file, verify_file)
         beside = {kind(path).name.lower() for kind in kinds for path in plates}
-        beside |= {many._named(path, None, 7).name for path in plates}
+        beside |= {ahead._named(path, None, 7).name for path in plates}
         assert not beside & {path.name.lower() for path in plates}
         assert len(set(plates)) == 3 + bool(other)
 
