@@ -2,7 +2,8 @@
 
 Blender itself notes a first Ctrl-C for the render that runs, forgets it where none runs, and is
 killed by a second one. So a Ctrl-C between two renders would be lost, and the next would leave
-everything half done. Here each Ctrl-C is noted, and handed on to Blender for its render.
+everything half done. Here each Ctrl-C is noted. It is handed on to Blender once a render has begun:
+in its first moments Blender would forget it.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+
+import bpy
 
 
 @dataclass
@@ -46,17 +49,38 @@ def noted() -> Iterator[Interrupts]:
     before = signal.set_wakeup_fd(mouth, warn_on_full_buffer=False)
     signal.signal(signal.SIGINT, lambda *_: None)
 
+    turn, renders = threading.Lock(), [False]
+
     def listen() -> None:
         while heard := os.read(ear, 1):
             if heard[0] == signal.SIGINT:
-                told.came = True
+                with turn:
+                    told.came = True
+                    if renders[0]:
+                        answer(signal.SIGINT)
+
+    def begins(*_: object) -> None:
+        with turn:
+            renders[0] = True
+            if told.came:
                 answer(signal.SIGINT)
 
+    def ends(*_: object) -> None:
+        with turn:
+            renders[0] = False
+
+    handlers = bpy.app.handlers
+    handlers.render_pre.append(begins)
+    handlers.render_complete.append(ends)
+    handlers.render_cancel.append(ends)
     listener = threading.Thread(target=listen, daemon=True)
     listener.start()
     try:
         yield told
     finally:
+        handlers.render_pre.remove(begins)
+        handlers.render_complete.remove(ends)
+        handlers.render_cancel.remove(ends)
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         library.signal(signal.SIGINT, blenders)
         signal.set_wakeup_fd(before)

@@ -82,14 +82,14 @@ def test_a_field_that_cannot_take_its_place_leaves_the_old_one(
 ) -> None:
     fitted(capture, tmp_path / "field")
     before = contents(tmp_path / "field")
-    rename: Callable = Path.rename
+    replace: Callable = Path.replace
 
     def failing(path: Path, to: Path) -> Path:
         if path.name.startswith("field.") and path.suffix == ".part":
             raise PermissionError("in use")
-        return rename(path, to)
+        return replace(path, to)
 
-    monkeypatch.setattr(Path, "rename", failing)
+    monkeypatch.setattr(Path, "replace", failing)
     with pytest.raises(FieldError, match="in use"):
         fitted(capture, tmp_path / "field", "whole")
     assert contents(tmp_path / "field") == before
