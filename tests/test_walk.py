@@ -59,7 +59,8 @@ name = next(a.module for a in bpy.context.preferences.addons if a.module.endswit
 assert not addon_utils.disable(name)
 assert not hasattr(bpy.types.Scene, "arto") and not hasattr(bpy.types.World, "arto")
 ours = {"ARTO Live", "ARTO Inside", "ARTO Light From", "ARTO Compare"}
-assert not ours & {i.name for i in bpy.data.images}
+left = ours & {i.name for i in bpy.data.images}
+assert not left, left
 assert addon_utils.enable(name) is not None
 """
 NAMES = "sorted(i.name for i in bpy.data.images)"

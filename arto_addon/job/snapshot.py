@@ -94,7 +94,7 @@ def pixels_of(image: bpy.types.Image) -> NDArray[np.float32]:
 
 
 def put_pixels(image: bpy.types.Image, path: Path) -> None:
-    """Give an image the pixels that `painted_pixels` wrote. Raises SceneError."""
+    """Give an image the pixels that `_painted` wrote. Raises SceneError."""
     try:
         pixels = arrays.read(path, 4 * len(image.pixels))
         if pixels.shape != (len(image.pixels),) or pixels.dtype != np.float32:

@@ -210,17 +210,26 @@ class Maps:
                     self._answered(None, f"the map of the world cannot be read ({e})")
         # If a world makes the process end, the world counts as failed and is not tried again. If
         # another process has been started since, the open question is for the new process.
-        if process is self._process:
-            try:
-                how = ended_by(process.wait(_REAP))
-            except subprocess.TimeoutExpired:
-                how = "it closed its output"
-            text = f"the Blender that makes maps of the world ended ({how}): change the world"
-            self._answered(None, text)
+        try:
+            how = ended_by(process.wait(_REAP))
+        except subprocess.TimeoutExpired:
+            how = "it closed its output"
+        text = f"the Blender that makes maps of the world ended ({how}): change the world"
+        self._answered(None, text, process)
 
-    def _answered(self, found: NDArray[np.float32] | None, error: str) -> None:
-        """Close the open question: keep its map, or why there is none."""
+    def _answered(
+        self,
+        found: NDArray[np.float32] | None,
+        error: str,
+        ended: subprocess.Popen[str] | None = None,
+    ) -> None:
+        """Close the open question: keep its map, or why there is none.
+
+        ended: the process that has ended, where that is the answer.
+        """
         with self._lock:
+            if ended is not None and ended is not self._process:
+                return
             asked, self._asked = self._asked, None
             if asked is None:
                 return

@@ -87,7 +87,11 @@ def test_no_console_window_flashes(monkeypatch):
     started = []
     monkeypatch.setattr(maps.subprocess, "Popen", lambda *_, **how: started.append(how))
     made = maps.Maps()
-    monkeypatch.setattr(maps.threading, "Thread", lambda **_: SimpleNamespace(start=lambda: None))
+    monkeypatch.setattr(
+        maps.threading,
+        "Thread",
+        lambda **_: SimpleNamespace(start=lambda: None, join=lambda *_: None),
+    )
     made.start()
     assert started[0]["creationflags"] & 0x08000000
     assert scripts.quietly()["creationflags"] == started[0]["creationflags"]
@@ -144,7 +148,7 @@ def test_a_scene_of_a_library_is_told_from_one_of_the_same_name(tmp_path):
 def test_painted_pixels_are_those_that_were_written(tmp_path, bad):
     image = bpy.data.images.new("Wood", 8, 4)
     image.pixels.foreach_set(np.linspace(0, 1, 128, dtype=np.float32))
-    path = tmp_path / snapshot.painted_pixels(image, tmp_path)
+    path = tmp_path / snapshot._painted(image, tmp_path).pixels
     wanted, data = arrays.read(path, 512), path.read_bytes()
     snapshot.put_pixels(image, path)
     found = np.empty(128, np.float32)
