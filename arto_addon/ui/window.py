@@ -141,4 +141,5 @@ def unregister() -> None:
         bpy.app.handlers.load_post.remove(_another_file)
     if _before_save in bpy.app.handlers.save_pre:
         bpy.app.handlers.save_pre.remove(_before_save)
+    if not bpy.app.background:
         put_away(name_of(bpy.context.scene), *OURS)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from types import SimpleNamespace
 
+import bpy
 import numpy as np
 import pytest
 from arto.arto_addon import work
@@ -161,7 +162,9 @@ def test_the_estimate_is_of_what_comes(tmp_path, monkeypatch):
         kept = folder if keep == "always" else paths.field_folder(scene)
         size = sum(p.stat().st_size for p in kept.rglob("*") if p.is_file())
         # never too little; how many entries a field has hangs on the noise, and images have none
-        assert size <= found.kept < (1.05 if keep == "always" else 1.15) * size
+        # (the passes are counted as Blender 5 has them: 4.5 has two less to guide the denoiser)
+        most = 1.05 if bpy.app.version >= (5, 0) else 1.08
+        assert size <= found.kept < (most if keep == "always" else 1.15) * size
         assert found.seconds is not None and found.seconds > 0
     # and time is of renders, paths and layers, at the pace of the last small render
     monkeypatch.setattr(small._Laps, "pace", lambda *_: Pace(2.0, 1e-5, 0.25))
