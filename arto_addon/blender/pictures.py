@@ -20,15 +20,15 @@ _MARK = "arto_picture"
 def put(name: str, picture: NDArray, display: bool = False) -> bpy.types.Image:
     """Show a picture as Blender's image of a name, which is made where there is none.
 
+    An image of the artist's that has the name keeps everything but that.
+
     picture: (H, W, 4), scene-linear, premultiplied, rows top-down; display: show the numbers as
     they are, else as a render is shown, with exposure, look and view transform.
     """
     height, width = picture.shape[:2]
-    image = bpy.data.images.get(name)
-    if image is not None and (image.library or not is_picture(image)):
-        bpy.data.images.remove(image)
-        image = None
+    image = of_name(name)
     if image is None:
+        step_aside(name)
         image = _new(name)
     if image.use_view_as_render == display:
         image.use_view_as_render = not display
@@ -37,6 +37,19 @@ def put(name: str, picture: NDArray, display: bool = False) -> bpy.types.Image:
     image.pixels.foreach_set(np.ascontiguousarray(picture[::-1], np.float32).ravel())
     image.update()
     return image
+
+
+def of_name(name: str) -> bpy.types.Image | None:
+    """The image of a name, where `put` made it."""
+    image = bpy.data.images.get((name, None))
+    return image if image is not None and is_picture(image) else None
+
+
+def step_aside(name: str) -> None:
+    """Give the file's image of a name, if there is one, the next free name."""
+    image = bpy.data.images.get((name, None))
+    if image is not None:
+        image.name = f"{name}.001"  # Blender counts on where that is taken
 
 
 def is_picture(image: bpy.types.Image) -> bool:

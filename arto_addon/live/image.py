@@ -10,7 +10,7 @@ from ...core import exr
 from ...core.region import Region
 from ..blender.editors import editors, replace, reveal
 from ..blender.markers import camera_of
-from ..blender.pictures import put
+from ..blender.pictures import of_name, put
 from ..plate import plate
 from ..plate.names import relit_file
 
@@ -75,6 +75,6 @@ def put_away(name: str, *others: str) -> None:
 
     name: the plate's, which editors show in their place; others: names of the other images.
     """
-    for image in filter(None, map(bpy.data.images.get, (IMAGE, *others))):
+    for image in filter(None, map(of_name, (IMAGE, *others))):
         replace(image.name, bpy.data.images.get(name))
         bpy.data.images.remove(image)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ...core import exr
 from ...core.errors import SceneError
 from ..blender.output import borrowed
-from ..blender.pictures import put
+from ..blender.pictures import of_name, put
 from ..blender.scratch import temporary
 from .names import relit_file
 
@@ -90,6 +90,6 @@ def joined(plate: NDArray, render: NDArray, how: str, wipe: float) -> NDArray[np
 def forget() -> None:
     """Let go of all compared pictures, and remove the image that shows them."""
     _pictures.clear()
-    image = bpy.data.images.get(IMAGE)
+    image = of_name(IMAGE)
     if image is not None:
         bpy.data.images.remove(image)

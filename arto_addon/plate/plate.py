@@ -18,6 +18,7 @@ from ...core.field.field import Field
 from ...core.files import whole
 from ..blender.colour import working_space
 from ..blender.compositing import mixed
+from ..blender.pictures import step_aside
 from ..shot import home
 from .header import header
 from .names import relit_name
@@ -188,7 +189,10 @@ def name_of(scene: bpy.types.Scene, look: str | None = None) -> str:
 
 def show(path: Path, name: str = IMAGE) -> bpy.types.Image:
     """Load a plate's file anew as Blender's image of a name, and return the image."""
-    image = bpy.data.images.get(name)
+    image = bpy.data.images.get((name, None))
+    if image is not None and image.source == "GENERATED":
+        step_aside(name)  # it was made or painted in Blender, and is nobody's plate
+        image = None
     relative = home.relative(path)
     if image is None:
         image = bpy.data.images.load(str(path))
