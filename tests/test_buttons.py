@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import signal
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -95,11 +97,13 @@ def test_what_the_buttons_show(walk: Walk) -> None:
     edges = [w.point(x, row) or w.get(slider) for row in rows]
     w.do("scene.world.arto.rotation = 0.5; scene.arto.live_finish = True")
     w.wait("session.current is not None")
+    pid = w.get("session.current.process.pid")
+    os.kill(pid, signal.SIGSTOP)  # so small a picture may be finished before all is looked at
     assert w.get("session.current.guest and session.busy() == ''")
     assert [w.point(x, row) or w.get(slider) for row in rows] == edges
-    pid = w.get("session.current.process.pid")
     press("show_plate")
     assert w.get("session.current is None")
+    os.kill(pid, signal.SIGCONT)
     ended(pid)
     w.wait("session.current is not None")  # it comes again
     w.do("scene.world.arto.rotation = 0.6")  # and goes where the light is another
