@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ...core.light.environment import Environment
 from ...core.region import Region
 from ..blender.nodes import Nodes, new_material, shader_tree
-from ..blender.reached import reached
+from ..blender.reached import reached, reached_places
 from ..shot.shot import layer_of
 from ..stage.stage import set_region
 from .brightest import brightest
@@ -31,8 +31,12 @@ from .studio import studio_scene
 # The least samples of a texel. A world that is finer than the map gets more, by the texels of the
 # world in a texel of the map.
 SAMPLES = 4
-# The samples of a texel of a rough map.
-ROUGH_SAMPLES = 2
+# The samples of a texel of a rough map, and those of all its texels with lamps together. While the
+# lamps are looked for, the sun of a sky is so many texels wide: a smaller one is missed by so few.
+ROUGH_SAMPLES, ROUGH_HOT = 2, 2**18
+ROUGH_SUN = 3
+# The most blocks with lamps that a rough map has time for.
+ROUGH_BLOCKS = 4
 # A texel with more than the share HOT of all light is part of a sun or a lamp. Such texels are
 # rendered again with their neighbours, FINER times as fine as the world. A lamp as large as two of
 # the world's texels then keeps its light to 0.3%. All these renders together take about
@@ -176,12 +180,68 @@ def _panorama(
 def rough(scene: bpy.types.Scene, width: int, world: bpy.types.World) -> Environment:
     """Make a rough map of a world in a moment, for Live while the artist moves a slider.
 
-    A texel has few samples, so detail finer than a texel is noisy.
+    A texel has few samples, so detail finer than a texel is noisy. Lamps that the few samples find
+    keep their light, as do the suns of skies.
     """
     with _panorama(scene, None, world) as studio:
-        studio.render.resolution_x, studio.render.resolution_y = width, width // 2
+        height = width // 2
+        studio.render.resolution_x, studio.render.resolution_y = width, height
         studio.cycles.samples = ROUGH_SAMPLES
-        return Environment(np.ascontiguousarray(render_studio(studio)[..., :3]))
+        finest = detail(world)
+        if finest <= width // 2 or math.isfinite(brightest(studio.world)):
+            return Environment(np.ascontiguousarray(render_studio(studio)[..., :3]))
+        studio.render.use_persistent_data = True
+        with _wide_suns(studio.world, ROUGH_SUN * 2 * math.pi / width):
+            image = np.ascontiguousarray(render_studio(studio)[..., :3])
+        energy = image.max(axis=-1) * Environment(image).row_solid_angles[:, None]
+        blocks = sorted(_hot_blocks(image), key=lambda b: -float(energy[b.slices].sum()))
+        _lamps_again(studio, image, blocks[:ROUGH_BLOCKS], finest / width, ROUGH_HOT)
+        studio.render.use_persistent_data = False
+        return Environment(image)
+
+
+@contextmanager
+def _wide_suns(world: bpy.types.World, least: float) -> Iterator[None]:
+    """Make the suns of a world's skies at least so wide, in radians. Their light stays the same."""
+    skies = [n for n, _ in reached_places(world) if n.bl_idname == "ShaderNodeTexSky"]
+    were = [(sky, sky.sun_size) for sky in skies]
+    try:
+        for sky, size in were:
+            sky.sun_size = max(size, least)
+        yield
+    finally:
+        for sky, size in were:
+            sky.sun_size = size
+
+
+def _lamps_again(
+    studio: bpy.types.Scene,
+    image: NDArray[np.float32],
+    blocks: list[Region],
+    fineness: float,
+    budget: int,
+) -> None:
+    """Render blocks of a map with lamps in them again, with many samples, and put them into it.
+
+    image: the map, (H, W, 3), which is changed; fineness: how many times finer than the map the
+    world is; budget: about so many samples for all blocks together. The studio's world is changed.
+    """
+    height = len(image)
+    _by_area(studio.world)
+    edges = np.sin(np.linspace(np.pi / 2, -np.pi / 2, height + 1))
+    cosine = ((edges[:-1] - edges[1:]) / (np.pi / height)).astype(np.float32)[:, None, None]
+    # One half of the samples is shared equally, and the other half by the blocks' light. By
+    # light alone, a block with only the rim of a lamp would get too few.
+    energy = image.max(axis=-1) * Environment(image).row_solid_angles[:, None]
+    light = [float(energy[b.slices].sum()) for b in blocks]
+    for block, amount in zip(blocks, light, strict=True):
+        part = (1 / len(blocks) + amount / sum(light)) / 2
+        room = budget * part / block.pixels
+        finer = min((FINER * max(fineness, 1)) ** 2, room)
+        studio.cycles.samples = max(LEAST_HOT, _power_of_two(finer))
+        set_region(studio, block)
+        rows, _ = block.slices
+        image[block.slices] = render_studio(studio)[..., :3] / cosine[rows]
 
 
 def _dim(studio: bpy.types.Scene) -> NDArray[np.float32] | None:
@@ -232,21 +292,7 @@ def bake(
         studio.cycles.samples = _power_of_two(fineness**2)
         image = np.ascontiguousarray(render_studio(studio)[..., :3])
         blocks = _hot_blocks(image)
-        _by_area(studio.world)
-        edges = np.sin(np.linspace(np.pi / 2, -np.pi / 2, height + 1))
-        cosine = ((edges[:-1] - edges[1:]) / (np.pi / height)).astype(np.float32)[:, None, None]
-        # One half of the samples is shared equally, and the other half by the blocks' light. By
-        # light alone, a block with only the rim of a lamp would get too few.
-        energy = image.max(axis=-1) * Environment(image).row_solid_angles[:, None]
-        light = [float(energy[b.slices].sum()) for b in blocks]
-        for block, amount in zip(blocks, light, strict=True):
-            part = (1 / len(blocks) + amount / sum(light)) / 2
-            room = HOT_SAMPLES * part / block.pixels
-            finer = min((FINER * max(fineness, 1)) ** 2, room)
-            studio.cycles.samples = max(LEAST_HOT, _power_of_two(finer))
-            set_region(studio, block)
-            rows, _ = block.slices
-            image[block.slices] = render_studio(studio)[..., :3] / cosine[rows]
+        _lamps_again(studio, image, blocks, fineness, HOT_SAMPLES)
         # This lets go of the images.
         render.use_persistent_data = False
     return Environment(image).coarser(scale)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from arto.arto_addon.blender.nodes import Nodes
-from arto.arto_addon.world.bake import bake
+from arto.arto_addon.world.bake import bake, rough
 from arto.arto_addon.world.brightest import brightest
 from arto.arto_addon.world.detail import FINEST, detail
 from arto.core.light.environment import Environment, directions
@@ -78,6 +78,26 @@ def test_a_disc_of_a_texture_keeps_its_light(scene):
     expected = (pixels * cosine[:, None, None]).sum(axis=(0, 1)) * side**2
     for width in (256, 1024):
         np.testing.assert_allclose(bake(scene, width).irradiance(), expected, rtol=0.01)
+
+
+def test_a_rough_map_has_the_light_of_suns(scene):
+    """What Live shows while a slider moves: by two samples a texel alone, a sun of half a degree
+    had from 0.2 to 1.4 of its light."""
+    pixels = np.full((512, 1024, 3), 0.1)
+    pixels[100, 400:402] = RADIANCE
+    texture = hdri(scene, pixels)
+    found = rough(scene, 512, scene.world).irradiance()
+    # what a texture shows is interpolated: at these latitudes that keeps the light to 1%
+    expected = Environment(pixels.astype(np.float32)).irradiance()
+    np.testing.assert_allclose(found, expected, rtol=0.01)
+    tree = scene.world.node_tree
+    tree.nodes.remove(texture)
+    sky = tree.nodes.new("ShaderNodeTexSky")
+    sky.sun_elevation, sky.sun_size = 0.6, math.radians(0.545)
+    tree.links.new(sky.outputs[0], tree.nodes["Background"].inputs["Color"])
+    expected = bake(scene, 256).irradiance()
+    np.testing.assert_allclose(rough(scene, 512, scene.world).irradiance(), expected, rtol=0.01)
+    assert sky.sun_size == pytest.approx(math.radians(0.545))
 
 
 def test_detail_is_read_from_the_nodes(scene):
