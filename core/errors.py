@@ -68,3 +68,7 @@ class StrictError(ArtoError):
 
 class FarmError(ArtoError):
     """A farm's job that is incomplete or damaged, or that was made for another scene."""
+
+
+class KitError(ArtoError):
+    """A light kit that cannot be: a number out of bounds, or a description of something else."""

@@ -6,7 +6,11 @@ import math
 
 import bpy
 
+from ...core.errors import KitError
+from ...core.kit.light import Kind
+from ...core.kit.model import BaseKind
 from ..blender.reached import Around, above, gives, reached_places
+from ..kit import base, groups, kit
 
 # The width of a map in which a lamp of a tenth of a degree is about two texels wide. Nodes that may
 # draw anything count as this fine, and no world counts as finer.
@@ -96,12 +100,40 @@ def _of_texture(node: bpy.types.Node, around: Around) -> int:
     return math.ceil(node.image.size[0] * stretch) if node.image else 0
 
 
+# The width of a map that holds a gradient.
+_GRADIENT = 64
+
+
+def _of_kit(world: bpy.types.World) -> int:
+    """The width of a map that holds all detail of a light kit."""
+    try:
+        found = kit.read(world)
+    except KitError:  # nodes work out a value
+        return FINEST
+    widest = _GRADIENT
+    if found.base.kind is BaseKind.HDRI:
+        size = base.image_of(found.base.image).size[0] if found.base.image else 0
+        # Every look-up of a blurred HDRI is another direction.
+        widest = max(widest, FINEST if found.base.blur > 0 else size)
+    for light in found.lit:
+        # Two texels across, as for the sun of a sky.
+        widest = max(widest, math.ceil(2 * 360 / light.smallest))
+        if light.kind is Kind.PICTURE:
+            node = groups.picture_node(kit.node_of(world, light.name).node_tree)
+            side = node.image.size[0] if node.image else 0
+            widest = max(widest, math.ceil(side * 360 / light.width))
+    return widest
+
+
 def detail(world: bpy.types.World) -> int:
     """The width of a map that holds all detail of a world, 1 to `FINEST`.
 
-    A texture is as fine as its pixels, and a sky as fine as its sun. Any other node that depends on
+    A texture is as fine as its pixels, a sky as fine as its sun, and a light kit as fine as its
+    smallest light. Any other node that depends on
     a direction may draw anything, so it counts as `FINEST`.
     """
+    if kit.is_whole(world):
+        return min(_of_kit(world), FINEST)
     widest = 1
     textures = frozenset({"ShaderNodeTexEnvironment", "ShaderNodeTexSky"})
     for node, around in reached_places(world):

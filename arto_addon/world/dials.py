@@ -17,6 +17,7 @@ import bpy
 
 from ...core.errors import SceneError
 from ..blender.nodes import shader_tree, trees
+from ..kit import kit
 from .detail import values_only
 from .still import still
 
@@ -86,6 +87,8 @@ def turner(world: bpy.types.World) -> bpy.types.Node | None:
     None where there is no such node, where several nodes turn the pictures, or where other nodes
     work out the rotation.
     """
+    if kit.has(world):
+        return kit.turns(world)
     ways = [[picture.inputs["Vector"]] for picture in _pictures(world)]
     ways = ways or [list(group.inputs) for group in _groups(world)]
     found = [_mappings_before(sockets) for sockets in ways]
@@ -99,6 +102,10 @@ def why_not_turned(world: bpy.types.World) -> str:
     """Say why a world cannot be turned, for a grey slider; empty where it can be turned."""
     if world.library:
         return "The world is linked from a library: make it local to change it"
+    if kit.has(world):
+        if kit.turns(world) is not None:
+            return ""
+        return "Other nodes stand around the light kit: turn them and the kit there"
     pictures, skies = _pictures(world), _skies(world)
     if skies and pictures:
         return "The world mixes a sky and HDRIs: turn them one by one"
@@ -157,7 +164,8 @@ def put_in_turner(world: bpy.types.World) -> bpy.types.Node:
 
 def turn(world: bpy.types.World) -> float:
     """The rotation of a world about the vertical, in radians, clockwise from above."""
-    if skies := _skies(world):
+    skies = [] if kit.has(world) else _skies(world)
+    if skies:
         return skies[0].sun_rotation
     node = turner(world)
     return node.inputs["Rotation"].default_value[2] if node else 0.0
@@ -169,7 +177,8 @@ def turn_to(world: bpy.types.World, angle: float) -> None:
     A sky turns by its Sun Rotation, several skies by as much as the first. Pictures turn by a
     mapping node, which is added where there is none.
     """
-    if skies := _skies(world):
+    skies = [] if kit.has(world) else _skies(world)
+    if skies:
         more = angle - skies[0].sun_rotation
         for sky in skies:
             sky.sun_rotation += more
@@ -229,6 +238,8 @@ def whole(world: bpy.types.World) -> tuple[bpy.types.Node | None, bpy.types.Node
     if background.bl_idname != "ShaderNodeBackground" or background.mute:
         return None, None
     dial = None if background.inputs["Strength"].is_linked else background
+    if kit.has(world):
+        return dial, kit.turns(world)
     nodes = [n for n in tree.nodes if not n.mute]
     textures = [n for n in nodes if n.bl_idname == "ShaderNodeTexEnvironment"]
     mappings = [n for n in nodes if n.bl_idname == "ShaderNodeMapping"]

@@ -94,10 +94,10 @@ def test_the_house_is_as_the_architecture_says() -> None:
 FLOW = {
     "core": """errors < units < memory < regular < checksum < before < marked < files < arrays
     < signed < region < file_names < description < values < shot < metrics < patterns < measure
-    < faces < partition < hemicube < exr < cryptomatte < capture < light < supports < field < fit
-    < lights < relight < catcher < preview < inside < verify""",
-    "arto_addon": """interrupt < work < settings < blender < stage < shot < world < plate < fit
-    < capture < relight < shoot < job < live < farm < ui""",
+    < faces < partition < hemicube < exr < cryptomatte < capture < light < kit < supports < field
+    < fit < lights < relight < catcher < preview < inside < verify""",
+    "arto_addon": """interrupt < work < settings < blender < stage < shot < kit < world < plate
+    < fit < capture < relight < shoot < job < live < farm < ui""",
 }
 
 
