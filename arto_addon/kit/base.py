@@ -114,7 +114,7 @@ def direction(tree: bpy.types.NodeTree) -> bpy.types.Node:
     if not into.is_linked:
         place = tree.nodes.new("ShaderNodeTexCoord")
         place.name = place.label = DIRECTION
-        place.location = node.location.x - 200, node.location.y
+        place.location = node.location[0] - 200, node.location[1]
         tree.links.new(place.outputs["Generated"], into)
     return node
 
@@ -221,7 +221,7 @@ def _new(
     node.name = node.label = f"{prefix} {part}"
     below = 300 if prefix == BASE else 620
     along = {"Turn": 200, "Blur": 400, "HDRI": 600, "Gradient": 600, "Strength": 880}[part]
-    place_node(node, (turn.location.x + along - 900, turn.location.y - below))
+    place_node(node, (turn.location[0] + along - 900, turn.location[1] - below))
     return node
 
 
@@ -307,7 +307,7 @@ def taken(world: bpy.types.World) -> Socket | None:
         return None
     shown = links[0].from_node
     turn = direction(tree)
-    place_node(turn, (shown.location.x - 900, shown.location.y - 300))
+    place_node(turn, (shown.location[0] - 900, shown.location[1] - 300))
     colour_in, scale = shown.inputs["Color"], shown.inputs["Strength"]
     if shown.mute or (not scale.is_linked and scale.default_value == 0):
         tree.nodes.remove(shown)

@@ -182,10 +182,10 @@ def put_in(world: bpy.types.World) -> Kit:
     out = tree.nodes.new("ShaderNodeBackground")
     out.name = out.label = OUT
     end = tree.get_output_node("CYCLES") or tree.nodes.new("ShaderNodeOutputWorld")
-    out.location = end.location.x - 220, end.location.y
+    out.location = end.location[0] - 220, end.location[1]
     tree.links.new(out.outputs[0], end.inputs["Surface"])
     turn = of_base.direction(tree)
-    turn.location = out.location.x - 900, out.location.y - 300
+    turn.location = out.location[0] - 900, out.location[1] - 300
     if TINT in tree.nodes:  # it goes on tinting what is the base now
         tree.nodes[TINT].name = "ARTO Base Tint"
     tint = tree.nodes.new("ShaderNodeRGB")
@@ -194,8 +194,8 @@ def put_in(world: bpy.types.World) -> Kit:
     tinted = tree.nodes.new("ShaderNodeVectorMath")
     tinted.name = tinted.label = TINTED
     tinted.operation = "MULTIPLY"
-    place_node(tinted, (out.location.x - 180, out.location.y))
-    place_node(tint, (out.location.x - 180, out.location.y - 180))
+    place_node(tinted, (out.location[0] - 180, out.location[1]))
+    place_node(tint, (out.location[0] - 180, out.location[1] - 180))
     tinted.inputs[0].default_value = (0.0, 0.0, 0.0)
     tree.links.new(tint.outputs[0], tinted.inputs[1])
     tree.links.new(tinted.outputs[0], out.inputs["Color"])
@@ -301,8 +301,8 @@ def _backdrop(
         camera.data_type = "RGBA"
         rays = tree.nodes.new("ShaderNodeLightPath")
         rays.name = rays.label = RAYS
-        place_node(camera, (out.location.x - 190, out.location.y - 240))
-        place_node(rays, (out.location.x - 390, out.location.y - 400))
+        place_node(camera, (out.location[0] - 190, out.location[1] - 240))
+        place_node(rays, (out.location[0] - 390, out.location[1] - 400))
         tree.links.new(rays.outputs["Is Camera Ray"], camera.inputs[0])
         tree.links.new(camera.outputs[2], out.inputs[0])
     was = camera.inputs[7]
