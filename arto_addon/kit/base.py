@@ -313,7 +313,7 @@ def taken(world: bpy.types.World) -> Socket | None:
         tree.nodes.remove(shown)
         return None
     if not colour_in.is_linked and not scale.is_linked:
-        grey = tuple(float(x) for x in colour_in.default_value[:3])
+        grey = colour(colour_in)
         base = Base(BaseKind.GRADIENT, strength=scale.default_value, top=grey, horizon=grey,
                     bottom=grey)  # fmt: skip
         tree.nodes.remove(shown)

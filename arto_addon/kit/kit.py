@@ -47,9 +47,10 @@ def has(world: bpy.types.World | None) -> bool:
 def out_of(world: bpy.types.World) -> bpy.types.Node | None:
     """The Background node of a world's kit; None without a kit."""
     tree = shader_tree(world)
-    node = tree.nodes.get(OUT) if tree else None
-    there = node and node.bl_idname == "ShaderNodeBackground" and TINTED in tree.nodes
-    return node if there else None
+    if tree is None or TINTED not in tree.nodes:
+        return None
+    node = tree.nodes.get(OUT)
+    return node if node and node.bl_idname == "ShaderNodeBackground" else None
 
 
 def _camera(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
