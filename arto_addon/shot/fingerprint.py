@@ -14,12 +14,13 @@ have them.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable
 
 import bpy
 import numpy as np
 
 from ..blender.markers import camera_of
+from ..work import driven
 from . import pixels, walk
 
 Fingerprint = dict[str, str]
@@ -76,14 +77,30 @@ def fingerprint(
     and the old contents counts as unchanged. full: read all files, whatever their times. This is
     for the fingerprint of a capture, with which later ones are compared.
     """
+    return driven(in_pieces(scene, view_layer, then, full), lambda _: None)
+
+
+Pieces = Generator[None, None, Fingerprint]
+
+
+def in_pieces(
+    scene: bpy.types.Scene, view_layer: str, then: Fingerprint | None = None, full: bool = False
+) -> Pieces:
+    """Make the same fingerprint in pieces of a few milliseconds each.
+
+    The scene must not change between two pieces: the fingerprint is then of no scene, and is to be
+    begun again. Where something was removed meanwhile, a piece raises ReferenceError.
+    """
     then = then or {}
     if full:
         forget()
     layer = scene.view_layers[view_layer]
     roots: list[bpy.types.ID] = [*rendered_objects(layer), *filter(None, [camera_of(scene)])]
     roots += filter(None, [layer.material_override])
-    out = {"Render settings": _settings(scene, layer), **of_blocks(roots, then, full)}
-    out |= _worked_out(layer)
+    out = {"Render settings": _settings(scene, layer)}
+    del layer
+    out |= yield from _blocks(roots, then, full, set())
+    out |= yield from _worked_out(scene, view_layer)
     return dict(sorted(out.items()))
 
 
@@ -98,7 +115,14 @@ def of_blocks(
     then, full: see `fingerprint`; without: sockets whose values do not count.
     """
     passed = {(socket.as_pointer(), type(socket)) for socket in without}
-    then, out = then or {}, {}
+    return driven(_blocks(roots, then or {}, full, passed), lambda _: None)
+
+
+def _blocks(
+    roots: Iterable[bpy.types.ID], then: Fingerprint, full: bool, passed: set[tuple[int, type]]
+) -> Pieces:
+    """Make the fingerprint of data-blocks, in pieces. passed: parts that do not count."""
+    out: Fingerprint = {}
     queue = list(roots)
     seen = {block.session_uid for block in queue}
     while queue:
@@ -108,7 +132,7 @@ def of_blocks(
         digest = looked.digest
         if isinstance(block, _GEOMETRY):
             if block.session_uid not in _arrays:
-                _arrays[block.session_uid] = walk.arrays(block)
+                _arrays[block.session_uid] = yield from walk.arrays_in_pieces(block)
             digest += _arrays[block.session_uid]
         elif isinstance(block, bpy.types.Key):
             if block.session_uid not in _arrays:
@@ -125,6 +149,7 @@ def of_blocks(
             if found.session_uid not in seen:
                 seen.add(found.session_uid)
                 queue.append(found)
+        yield
     return out
 
 
@@ -213,13 +238,14 @@ def _flags(there: bpy.types.LayerCollection) -> list[object]:
     return found + [f for child in there.children for f in _flags(child)]
 
 
-def _worked_out(layer: bpy.types.ViewLayer) -> Fingerprint:
+def _worked_out(scene: bpy.types.Scene, view_layer: str) -> Pieces:
     """Digests of the transforms and deformed geometry that the viewport has worked out."""
-    depsgraph = layer.depsgraph
-    if depsgraph is None or not depsgraph.scene:
-        return {}
-    out = {}
-    for thing in rendered_objects(layer):
+    out: Fingerprint = {}
+    for thing in rendered_objects(scene.view_layers[view_layer]):
+        layer = scene.view_layers[view_layer]
+        depsgraph = layer.depsgraph
+        if depsgraph is None or not depsgraph.scene:
+            return {}
         if not thing.visible_get(view_layer=layer):
             continue
         if thing.session_uid not in _evaluated:
@@ -227,6 +253,8 @@ def _worked_out(layer: bpy.types.ViewLayer) -> Fingerprint:
         matrix = [round(x, 5) for row in thing.matrix_world for x in row]
         digest = hashlib.blake2b(repr(matrix).encode(), digest_size=8).hexdigest()
         out[f"={_words(thing)}"] = f"{_evaluated[thing.session_uid]}{digest}"
+        del layer, depsgraph
+        yield
     return out
 
 

@@ -1,6 +1,11 @@
-"""Keep the scene's fingerprint up to date: it is made after a change, never while drawing."""
+"""Keep the scene's fingerprint up to date: it is made after a change, never while drawing.
+
+It is made in pieces, between which the window goes on. A change begins it anew.
+"""
 
 from __future__ import annotations
+
+import time
 
 import bpy
 from bpy.app.handlers import persistent
@@ -17,6 +22,10 @@ _PANELS = {"PROPERTIES": "WINDOW", "VIEW_3D": "UI", "IMAGE_EDITOR": "UI", "NODE_
 _latest: dict[tuple[int, str], Fingerprint] = {}
 _asked: dict[tuple[int, str], Fingerprint] = {}
 _stale: set[tuple[int, str]] = set()
+# The fingerprint that is being made, in pieces.
+_making: list[tuple[tuple[int, str], prints.Pieces]] = []
+# Seconds of the window's thread that are spent on pieces at a time, and seconds between two times.
+SLICE, PAUSE = 0.015, 0.01
 
 
 def latest(
@@ -54,18 +63,38 @@ def _look() -> float | None:
         return REST
     if bpy.app.is_job_running("RENDER"):
         return REST
-    scenes = {s.session_uid: s for s in bpy.data.scenes}
-    for key in list(_stale):
-        _stale.discard(key)
-        uid, view_layer = key
-        scene = scenes.get(uid)
-        if scene is None or view_layer not in scene.view_layers:
-            _latest.pop(key, None)
-            _asked.pop(key, None)
+    until = time.perf_counter() + SLICE
+    while _making or _stale:
+        if _making and _making[0][0] in _stale:
+            _making.clear()  # the scene has changed meanwhile
+        if not _making and not _begin(_stale.pop()):
             continue
-        _latest[key] = prints.fingerprint(scene, view_layer, _asked[key])
+        key, pieces = _making[0]
+        try:
+            while time.perf_counter() < until:
+                next(pieces)
+            return PAUSE
+        except StopIteration as end:
+            _latest[key] = end.value
+        except (ReferenceError, KeyError):  # it was removed, which Blender has not reported yet
+            _stale.add(key)
+            _making.clear()
+            return REST
+        _making.clear()
     redraw()
     return None
+
+
+def _begin(key: tuple[int, str]) -> bool:
+    """Begin a fingerprint -> whether its scene and its view layer are still there."""
+    uid, view_layer = key
+    scene = next((s for s in bpy.data.scenes if s.session_uid == uid), None)
+    if scene is None or view_layer not in scene.view_layers:
+        _latest.pop(key, None)
+        _asked.pop(key, None)
+        return False
+    _making[:] = [(key, prints.in_pieces(scene, view_layer, _asked[key]))]
+    return True
 
 
 def _read_soon() -> None:
@@ -120,6 +149,7 @@ def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 @persistent
 def _all_changed(*_: object) -> None:
     """Look at everything again, after undo, redo, or another file."""
+    _making.clear()
     prints.forget()
     pixels.forget()
     scenes = {s.session_uid for s in bpy.data.scenes}
@@ -153,5 +183,5 @@ def unregister() -> None:
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)
     pixels.begun = None
-    for kept in (_latest, _asked, _stale):
+    for kept in (_latest, _asked, _stale, _making):
         kept.clear()

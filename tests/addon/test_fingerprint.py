@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 
 import bpy
 import numpy as np
@@ -10,8 +11,8 @@ import pytest
 from arto.arto_addon import work
 from arto.arto_addon.fit import fit
 from arto.arto_addon.relight import relight
-from arto.arto_addon.shot import status
-from arto.arto_addon.shot.fingerprint import changes, fingerprint
+from arto.arto_addon.shot import status, walk
+from arto.arto_addon.shot.fingerprint import changes, fingerprint, in_pieces
 from arto.core import exr
 from scene_tools import add_mesh, captured, set_colour, small_scene
 
@@ -227,3 +228,33 @@ def test_a_capture_goes_on_only_with_what_it_began_with(tmp_path, monkeypatch):
     assert tiles_rendered() == 2
     set_input("Matt", "Roughness", 1.0)
     assert tiles_rendered() == 1
+
+
+def test_a_large_mesh_is_read_in_pieces(tmp_path, monkeypatch):
+    """The window goes on between them, and what they make is the same."""
+    scene = small_scene(tmp_path)
+    side = 1200
+    mesh = bpy.data.meshes.new("Large")
+    mesh.vertices.add(side * side)
+    mesh.vertices.foreach_set("co", np.random.default_rng(0).random(3 * side * side, np.float32))
+    scene.collection.objects.link(bpy.data.objects.new("Large", mesh))
+    layer = scene.view_layers[0].name
+    monkeypatch.setattr(walk, "_PIECE", 1 << 22)
+    spent, pieces = [], in_pieces(scene, layer, full=True)
+    while True:
+        begun = time.thread_time()
+        try:
+            next(pieces)
+        except StopIteration as end:
+            made = end.value
+            break
+        spent.append(time.thread_time() - begun)
+    assert made == fingerprint(scene, layer, full=True)
+    assert len(spent) > 12 * side * side >> 22
+    assert max(spent) < 0.05
+    # what is removed between two pieces ends them, and nothing of it is read
+    pieces = in_pieces(scene, layer, full=True)
+    next(pieces)
+    bpy.data.meshes.remove(mesh)
+    with pytest.raises(ReferenceError):
+        list(pieces)
