@@ -67,6 +67,7 @@ class Live:
         shown = Shown(scene, self.layer)
         check_same_shot(scene, shown.field.about.shot, "the reflectance field", self.layer)
         check_film(scene, shown.field)
+        self.field = shown.field
         self.folder = shown.field.folder
         self.written = (self.folder / "field.json").stat().st_mtime_ns
         fields = [take.field for take in shown.takes]
@@ -78,7 +79,8 @@ class Live:
         self._shot = self._place(scene)
         # what a live picture lacks and the relight adds, in words
         self.held, self.behind = shown.held, True
-        self.trouble = self.problem = ""
+        # what Live has to say, why there is no map, and which film the shot was not captured for
+        self.trouble = self.problem = self.film = ""
         self.line = "Starting"
         self.dirty = True
         self._looked = 0.0
@@ -133,7 +135,7 @@ class Live:
             redraw()
             watch.redraw()
         said = self.maps.trouble_with(self._now.key) if self._now else ""
-        trouble = self.problem or said or self.viewer.trouble or self.failed
+        trouble = self.film or self.problem or said or self.viewer.trouble or self.failed
         if self._place(scene) != self._shot:
             trouble = "Live shows the shot that it was switched on for: this is another one"
         if trouble != self.trouble:
@@ -171,7 +173,13 @@ class Live:
             raise SceneError("the scene has no world any more: add one, and switch Live on again")
         key, strength, turn = shows(scene, world)
         settings, gains = scene.arto, tuple(gains_of(scene).items())
-        found = Light(key, strength, turn, settings.own_lamps, gains, settings.live_finish)
+        own, clear = settings.own_lamps, scene.render.film_transparent
+        found = Light(key, strength, turn, own, gains, clear, settings.live_finish)
+        self.film = ""
+        try:
+            check_film(scene, self.field)
+        except SceneError as e:
+            self.film = str(e)
         if found == self._now:
             return
         self._now, self._changed, self.failed = found, now, ""
@@ -188,7 +196,7 @@ class Live:
 
     def _wish(self, scene: bpy.types.Scene, now: float) -> None:
         light = self._now
-        if light is None:
+        if light is None or self.film:
             return
         key, strength, turn = light.key, light.strength, light.turn
         rest = now - self._changed
@@ -217,10 +225,8 @@ class Live:
         if wished != self._wished:
             self._wished = wished
             gains = gains_of(scene)
-            view = None
-            if not scene.render.film_transparent:
-                view = view_of(scene, self.shape, self.region)
-                self.behind = view is not None
+            view = None if light.clear else view_of(scene, self.shape, self.region)
+            self.behind = light.clear or view is not None
             self.viewer.wish(Wish(image, strength, turn, light.own, gains, wished.whole, view))
         if light.finish and not self.finished and rest > FINISHED and self.settled:
             self._finish(scene)

@@ -26,16 +26,15 @@ from ...core.memory import ended_by
 from ..blender import scratch, scripts
 from ..blender.addon import ADDON
 from ..blender.colour import work_in, working_space
-from ..blender.nodes import shader_tree, trees
-from ..job.snapshot import in_no_file, pixels_of, put_pixels
+from ..job.snapshot import put_pixels
 from ..shot import home
 from ..shot.pixels import image as digest_of
 from ..world import kept
 from ..world.bake import rough
 from ..world.check import check_world
 from ..world.dials import without_dials
-from ..world.still import is_restless, still
 from ..world.studio import like_textures, of_textures
+from .sent import Apart, Sent, images, put_back
 
 # How a line with an answer begins: Blender prints other lines too.
 ANSWER = "ARTO map "
@@ -54,8 +53,8 @@ class Question:
 
     blend: a file with the world in it; world: the world's name there; width: the width of a full
     map, 0 for a rough map; space: the working colour space; textures: see `studio.of_textures`;
-    painted: for each image that is in no file, its name and the file with its pixels; folder: where
-    full maps are kept; out: the .npy file to write.
+    apart: its large packed images, see `sent`; painted: for each image that is in no file, its name
+    and the file with its pixels; folder: where full maps are kept; out: the .npy file to write.
     """
 
     blend: str
@@ -66,6 +65,7 @@ class Question:
     space: str
     device: str
     textures: list[object]
+    apart: list[Apart]
     painted: dict[str, str]
     folder: str
     out: str
@@ -87,9 +87,7 @@ class Maps:
         self.newest: tuple[str, NDArray[np.float32]] | None = None
         self._lock = threading.Lock()
         self.trouble = ""
-        self._number = 0
-        # the digests of painted images, by the files with their pixels
-        self._painted: dict[Path, str] = {}
+        self._sent = Sent(self._folder)
         self._failed: dict[tuple[str, bool], str] = {}
 
     def start(self) -> None:
@@ -142,20 +140,8 @@ class Maps:
             self.start()
         process = self._process
         assert process and process.stdin
-        # a new name each time: Blender does not read a library of a known name again
-        self._number += 1
-        blend = self._folder / f"world{self._number}.blend"
-        painted = {}
-        name = _write(scene, layer, world, blend)
-        pixels: dict[Path, NDArray[np.float32]] = {}
-        for image in images(world):
-            if not in_no_file(image):
-                continue
-            path, digest = self._folder / f"painted_{image.session_uid}.npy", digest_of(image)
-            if self._painted.get(path) != digest:
-                self._painted[path] = digest
-                pixels[path] = pixels_of(image)
-            painted[image.name] = str(path)
+        blend, name, apart = self._sent.world(scene, layer, world)
+        painted, pixels = self._sent.painted(world)
         question = Question(
             blend=str(blend),
             world=name,
@@ -165,6 +151,7 @@ class Maps:
             space=working_space(),
             device=scene.cycles.device,
             textures=of_textures(scene),
+            apart=apart,
             painted=painted,
             folder=str(home.absolute(scene.arto.folder)),
             out=str(self._folder / MAP),
@@ -187,7 +174,7 @@ class Maps:
             for path, values in pixels.items():
                 arrays.write(path, values)
         except OSError as e:
-            self._painted.clear()
+            self._sent.forget()
             self._answered(None, f"painted pixels cannot be written ({e}): make room on the disk")
             return False
         try:
@@ -275,26 +262,6 @@ def _map(path: Path) -> NDArray[np.float32]:
     return found
 
 
-def _write(scene: bpy.types.Scene, layer: str, world: bpy.types.World, blend: Path) -> str:
-    """Write a world into a small file -> the world's name there. Raises SceneError."""
-    with contextlib.ExitStack() as held:
-        if world.library or is_restless(world):
-            # a linked world is not written, and the other Blender does not have this scene
-            world = held.enter_context(still(scene, layer, world))
-        try:
-            # absolute paths: the small file lies in another folder than the artist's
-            bpy.data.libraries.write(str(blend), {world}, path_remap="ABSOLUTE", fake_user=True)
-        except (OSError, RuntimeError) as e:
-            raise SceneError(f"the world cannot be written to {blend} ({e})") from e
-        return world.name
-
-
-def images(world: bpy.types.World) -> list[bpy.types.Image]:
-    """The images that a world's nodes use, groups included."""
-    found = [n for t in trees(shader_tree(world), set()) for n in t.nodes]
-    return [n.image for n in found if getattr(n, "image", None)]
-
-
 def command() -> list[str]:
     """The command that starts the second Blender; a Python where Blender runs as a module."""
     if bpy.app.binary_path and not bpy.app.module:
@@ -328,6 +295,7 @@ def _made(asked: Question) -> str:
         into.worlds.append(asked.world)
     world = into.worlds[0]
     try:
+        put_back(asked.apart)
         for name, pixels in asked.painted.items():
             image = bpy.data.images[name]
             put_pixels(image, Path(pixels))

@@ -10,7 +10,8 @@ class Light:
     """The light that a live picture is to show.
 
     key: what the world shows, apart from its strength and turn; own: how much of the scene's own
-    lamps; gains: by their light groups; finish: whether a relight finishes it when it rests.
+    lamps; gains: by their light groups; clear: whether the film is transparent; finish: whether a
+    relight finishes the picture when the light rests.
     """
 
     key: str
@@ -18,6 +19,7 @@ class Light:
     turn: float
     own: float
     gains: tuple[tuple[str, float], ...]
+    clear: bool
     finish: bool
 
 

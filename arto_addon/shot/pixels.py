@@ -61,10 +61,31 @@ def image(block: bpy.types.Image, then: str = "", full: bool = False) -> str:
         return walk.file(block.filepath, block.library, then, full)
     size = block.size[0] * block.size[1] * 16
     if not painted:
-        size = sum(packed.packed_file.size for packed in block.packed_files)
+        size = packed_size(block)
     if full or bpy.app.background or size <= FEW:
         return _digest(_bytes(block, painted))
     return _in_thread(block, painted)
+
+
+def packed_size(block: bpy.types.Image) -> int:
+    """The bytes of an image that are packed into the .blend."""
+    return sum(packed.packed_file.size for packed in block.packed_files if packed.packed_file)
+
+
+def version(block: bpy.types.Image) -> str:
+    """What says whether an image is as it was: of its settings, and of its pixels without a file.
+
+    In the window the pixels are not read: they are others once Blender reports a change.
+    """
+    painted = block.is_dirty or (block.source == "GENERATED" and not block.packed_file)
+    seen = image(block) if bpy.app.background else _seen(block, painted)
+    return f"{walk.Walk(block).digest} {seen}"
+
+
+def _seen(block: bpy.types.Image, painted: bool) -> tuple[object, ...]:
+    """By what one sees that an image has changed, without reading it."""
+    packed = [(p.packed_file.as_pointer(), p.packed_file.size) for p in block.packed_files]
+    return (_changes[block.session_uid], painted, packed, tuple(block.size))
 
 
 def _bytes(block: bpy.types.Image, painted: bool) -> list[bytes | np.ndarray]:
@@ -85,8 +106,7 @@ def _digest(parts: list[bytes | np.ndarray]) -> str:
 def _in_thread(block: bpy.types.Image, painted: bool) -> str:
     """The kept digest of an image, which a thread makes; until then a digest of its own."""
     uid = block.session_uid
-    packed = [(p.packed_file.as_pointer(), p.packed_file.size) for p in block.packed_files]
-    of = (_changes[uid], painted, packed, tuple(block.size))
+    of = _seen(block, painted)
     if uid not in _kept or _kept[uid].of != of:
         kept = _kept[uid] = _Kept(of)
         parts = _bytes(block, painted)

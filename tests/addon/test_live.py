@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -11,14 +13,14 @@ import pytest
 from arto.arto_addon import shoot, work
 from arto.arto_addon.blender import pictures
 from arto.arto_addon.fit import fit
-from arto.arto_addon.live import live, maps
+from arto.arto_addon.live import live, maps, sent
 from arto.arto_addon.live.image import IMAGE, put_away
 from arto.arto_addon.live.viewer import Viewer, Wish
 from arto.arto_addon.plate import compare
 from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.relight.light_key import HEADER, light_key
 from arto.arto_addon.relight.relight import compute
-from arto.arto_addon.shot import paths
+from arto.arto_addon.shot import paths, pixels
 from arto.arto_addon.world import kept
 from arto.arto_addon.world.dials import without_dials
 from arto.core import exr
@@ -237,12 +239,12 @@ def test_a_killed_blender_is_said_and_another_one_is_started(scene) -> None:
 def test_no_room_for_the_worlds_file(scene, tmp_path) -> None:
     """A sentence, and it goes on once there is room again."""
     made = maps.Maps()
-    folder, made._folder = made._folder, tmp_path / "gone" / "far"
+    folder, made._sent._folder = made._folder, tmp_path / "gone" / "far"
     try:
         with pytest.raises(SceneError, match="cannot be written"):
             made.ask(scene, scene.view_layers[0].name, scene.world, "one", False)
         assert not made.busy
-        made._folder = folder
+        made._sent._folder = folder
         assert _answer(made, scene, "one") == ""
     finally:
         made.close()
@@ -299,6 +301,40 @@ def test_maps_are_those_of_a_relight(scene) -> None:
         made.close()
 
 
+def test_a_packed_hdri_is_sent_once_for_each_change(scene, monkeypatch) -> None:
+    """And the map is that of a relight, kept by the same key."""
+    monkeypatch.setattr(pixels, "FEW", 0)
+    written, write = [], sent._write
+    monkeypatch.setattr(
+        sent, "_write", lambda path, of: (written.append(type(of)), write(path, of))
+    )
+    worlds, images = len(bpy.data.worlds), len(bpy.data.images)
+    image = next(n.image for n in scene.world.node_tree.nodes if getattr(n, "image", None))
+    painted = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(painted)
+    made = maps.Maps()
+    try:
+        for change in (1.0, 0.5):
+            image.pixels.foreach_set(painted * np.tile(np.float32([change] * 3 + [1]), 64 * 32))
+            image.update()
+            image.pack()
+            for tint in (0.9, 0.8):
+                scene.world.arto.tint = (1.0, tint, 1.0)
+                found = whole_map(made, scene)
+                with without_dials(scene, scene.view_layers[0].name, scene.world) as (plain, _, _):
+                    kept_as = f"{kept._key(scene, plain, 128)}.npy"
+                    assert (paths.worlds_folder(scene) / kept_as).is_file()
+                    np.testing.assert_array_equal(found, kept.bake(scene, 128, None, plain).image)
+        kinds = [bpy.types.Image, bpy.types.World, bpy.types.World]
+        assert written == 2 * kinds
+    finally:
+        made.close()
+        scene.world.arto.tint = (1, 1, 1)
+        image.pixels.foreach_set(painted)
+        image.pack()
+    assert (len(bpy.data.worlds), len(bpy.data.images)) == (worlds, images)
+
+
 def test_the_world_behind_and_a_render_region(tmp_path) -> None:
     """An even world is behind the things as it is behind the plate's, in the region alone."""
     scene = small_scene(tmp_path)
@@ -318,6 +354,30 @@ def test_the_world_behind_and_a_render_region(tmp_path) -> None:
         on.close()
         put_away(on.name)
     assert np.abs(seen - plate).max() < 1e-3 * plate[..., :3].mean()
+
+
+def test_another_film_while_it_is_on(scene, on) -> None:
+    """The world behind comes and goes with the film; a film that the shot's Ray Portals were not
+    captured for is said, and nothing wrong is shown meanwhile."""
+    clear = _rest(on)
+    scene.render.film_transparent = False
+    try:
+        opaque = _rest(on)
+        assert (clear[..., 3] < 1).any() and (opaque[..., 3] == 1).all()
+        scene.render.film_transparent = True
+        np.testing.assert_array_equal(_rest(on), clear)
+        on.field = SimpleNamespace(about=replace(on.field.about, portals=True))
+        on.dirty = True
+        assert on.tick() and "Ray Portals" in on.trouble
+        made = on.viewer.made
+        scene.world.arto.strength = 0.7
+        on.dirty = True
+        assert on.tick() and on.viewer.made == made
+        scene.render.film_transparent = False
+        _rest(on)
+        assert on.viewer.made > made
+    finally:
+        scene.render.film_transparent, scene.world.arto.strength = True, 1.0
 
 
 def test_a_linked_world(tmp_path) -> None:

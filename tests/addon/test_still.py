@@ -9,7 +9,7 @@ from arto.arto_addon.blender.nodes import new_world
 from arto.arto_addon.blender.output import float_exr
 from arto.arto_addon.blender.reached import reached
 from arto.arto_addon.capture.check import check_scene
-from arto.arto_addon.live import maps
+from arto.arto_addon.live import sent
 from arto.arto_addon.stage.settings import prepare
 from arto.arto_addon.stage.stage import stage
 from arto.arto_addon.world import images, kept
@@ -300,8 +300,7 @@ def test_live_writes_a_world_that_stands_still(scene, tmp_path):
     node.attribute_type, node.attribute_name = "VIEW_LAYER", "sky"
     background = scene.world.node_tree.nodes["Background"]
     scene.world.node_tree.links.new(node.outputs["Fac"], background.inputs["Strength"])
-    blend = tmp_path / "world.blend"
-    name = maps._write(scene, scene.view_layers[0].name, scene.world, blend)
+    blend, name, _ = sent.Sent(tmp_path).world(scene, scene.view_layers[0].name, scene.world)
     with bpy.data.libraries.load(str(blend)) as (there, into):
         assert not there.scenes and not there.objects
         into.worlds = [name]
