@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from . import mirrors_command
+from . import heavy_command, mirrors_command
 
 
 def _demo(options: argparse.Namespace) -> None:
@@ -293,6 +293,7 @@ def main() -> int:
     c.set_defaults(run=_accuracy)
 
     mirrors_command.add(commands)
+    heavy_command.add(commands)
 
     c = commands.add_parser("noise", help="where to take out the noise of a capture")
     c.add_argument("--json", type=Path, default=Path("out/noise.json"))

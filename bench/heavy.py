@@ -1,0 +1,215 @@
+"""Heavy scenes: how long a capture takes beside a plain render, with preparation in both.
+
+Each stage runs in a process of its own, which renders a tiny scene, builds the real one, and is
+then timed. How often Cycles prepared the scene is counted from what Cycles says (`Counted`).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from .machine import write_rows
+
+ROOT = Path(__file__).resolve().parent.parent
+MARK = "ARTO rows: "
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Size:
+    """Of a picture. megabytes: what a capture may take, which decides the number of its tiles."""
+
+    width: int
+    height: int
+    samples: int
+    megabytes: int
+    share: float = 1.0
+
+
+@dataclass
+class Counted:
+    """What Cycles said while it was listened to.
+
+    renders: how often it began to sample; prepared_times: how often it built the tree of all
+    triangles, which is done anew where any object was added, removed or changed; synchronized: how
+    many objects it read from Blender, each time that it did.
+    """
+
+    renders: int = 0
+    prepared_times: int = 0
+    synchronized: int = 0
+
+    def told(self, *arguments: object) -> None:
+        """Hear a line of Cycles' status; a handler of `render_stats`."""
+        says = str(arguments[0]) if arguments else ""
+        self.prepared_times += says.endswith("Updating Scene BVH | Building")
+        self.synchronized += "Synchronizing object |" in says
+        self.renders += "Sample 0/" in says
+
+
+@contextmanager
+def counted() -> Iterator[Counted]:
+    """Count how often Cycles prepares a scene while this is open."""
+    import bpy
+
+    found = Counted()
+    handlers = bpy.app.handlers.render_stats
+    handlers.append(found.told)
+    try:
+        yield found
+    finally:
+        handlers.remove(found.told)
+
+
+def _measured(stage: str, work: Callable[[], Any]) -> Row:
+    """Do a stage's work -> its row. cpu_seconds: of all threads, which other programs on the
+    machine change less than seconds."""
+    with counted() as count:
+        begun, worked = time.perf_counter(), time.process_time()
+        work()
+        seconds, cpu = time.perf_counter() - begun, time.process_time() - worked
+    return {"stage": stage, "seconds": seconds, "cpu_seconds": cpu, **asdict(count)}
+
+
+def _settings(scene: Any, size: Size, folder: Path) -> None:
+    settings = scene.arto
+    settings.folder, settings.output = str(folder / "arto"), str(folder / "relit.exr")
+    settings.quality, settings.samples = "CUSTOM", size.samples
+    settings.keep, settings.memory = "never", size.megabytes
+
+
+def plain(scene: Any, size: Size, folder: Path) -> list[Row]:
+    """The artist's own render, without denoising."""
+    import bpy
+
+    scene.cycles.samples = size.samples
+    scene.render.filepath = str(folder / "plain")
+    return [
+        _measured("plain render", lambda: bpy.ops.render.render(scene=scene.name, write_still=True))
+    ]
+
+
+def capture(scene: Any, size: Size, folder: Path) -> list[Row]:
+    """A capture that is fitted as it comes."""
+    from arto.arto_addon import work
+    from arto.arto_addon.capture.capture import capture as steps
+    from arto.core.field.field import Field
+
+    made: list[Path] = []
+    row = _measured(
+        "capture", lambda: made.append(work.run(steps(scene, scene.view_layers[0].name)))
+    )
+    field = Field(made[0].with_name("field"))
+    return [row | {"tiles": len(field.tiles), "patches": len(field.hemicube)}]
+
+
+def probe(scene: Any, size: Size, folder: Path) -> list[Row]:
+    """All that a capture does before its first tile, and the seconds that it then tells."""
+    from arto.arto_addon import work
+    from arto.arto_addon.capture.capture import estimate
+
+    found: list[Any] = []
+    steps = estimate(scene, scene.view_layers[0].name)
+    row = _measured("before the first tile", lambda: found.append(work.run(steps)))
+    return [row | {"told_seconds": found[0].seconds}]
+
+
+STAGES: dict[str, Callable[[Any, Size, Path], list[Row]]] = {
+    "plain": plain,
+    "probe": probe,
+    "capture": capture,
+}
+
+
+def child(stage: str, name: str, size: dict[str, Any], folder: str) -> None:
+    """Build a scene, run a stage of it, and print its rows as a line of JSON."""
+    import bpy
+
+    from .heavy_scenes import SCENES
+    from .reference import registered
+
+    # the first render of a process pays for loading Cycles
+    SCENES["0.5 M triangles"](8, 8, 0.001).cycles.samples = 1
+    bpy.ops.render.render()
+    of = Size(**size)
+    scene = SCENES[name](of.width, of.height, of.share)
+    registered()
+    _settings(scene, of, Path(folder))
+    bpy.ops.wm.save_as_mainfile(filepath=str(Path(folder) / "scene.blend"))
+    print(MARK + json.dumps(STAGES[stage](bpy.context.scene, of, Path(folder))), flush=True)
+
+
+def _run(stage: str, name: str, size: Size) -> list[Row]:
+    """The rows of a stage, run in a process of its own."""
+    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile("w+") as out:
+        text = f"from bench.heavy import child; child({stage!r}, {name!r}, {asdict(size)!r}, "
+        line = [sys.executable, "-c", f"{text}{folder!r})"]
+        process = subprocess.Popen(line, cwd=ROOT, stdout=out, stderr=subprocess.STDOUT, text=True)
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        out.seek(0)
+        said = out.read()
+    if process.returncode:
+        raise RuntimeError(f"the stage {stage} of '{name}' failed:\n{said[-3000:]}")
+    (rows,) = (json.loads(t[len(MARK) :]) for t in said.splitlines() if t.startswith(MARK))
+    about = {"scene": name, "width": size.width, "height": size.height, "samples": size.samples}
+    return [about | row | {"peak_bytes": usage.ru_maxrss * 1024} for row in rows]
+
+
+def heavy(
+    out: Path, scenes: list[str], sizes: list[tuple[int, int]], samples: int, share: float,
+    stages: list[str],
+) -> list[Row]:  # fmt: skip
+    """All rows, written after every stage. share: of each scene's triangles, texels and hairs."""
+    rows: list[Row] = []
+    for name in scenes:
+        for width, height in sizes:
+            # about four tiles of 200 patches under three patterns
+            megabytes = max(64, width * height * 1024 // (480 * 270))
+            size = Size(width, height, samples, megabytes, share)
+            plain_row: Row | None = None
+            for stage in stages:
+                for row in _run(stage, name, size):
+                    if row["stage"] == "plain render":
+                        plain_row = row
+                    elif row["stage"] == "capture" and plain_row:
+                        row["limit_seconds"] = plain_row["seconds"]
+                        row["ratio"] = row["seconds"] / plain_row["seconds"]
+                        row["cpu_ratio"] = row["cpu_seconds"] / plain_row["cpu_seconds"]
+                    rows.append(row)
+                    write_rows(out, rows)
+                    print(table([row]).splitlines()[-1], flush=True)
+    return rows
+
+
+def table(rows: list[Row]) -> str:
+    """Markdown."""
+    head = ["scene", "size", "samples", "stage", "seconds", "limit", "ratio", "of threads"]
+    head += ["ratio of these", "prepared", "objects read", "tiles", "peak"]
+    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
+    for r in rows:
+        told = f", told {r['told_seconds']:.1f}" if r.get("told_seconds") else ""
+        cells = [r["scene"], f"{r['width']}x{r['height']}", str(r["samples"]), r["stage"] + told]
+        cells += [
+            f"{r['seconds']:.1f}",
+            f"{r['limit_seconds']:.1f}" if "limit_seconds" in r else "",
+        ]
+        cells += [f"{r['ratio']:.2f}" if "ratio" in r else "", f"{r['cpu_seconds']:.1f}"]
+        cells += [f"{r['cpu_ratio']:.2f}" if "cpu_ratio" in r else "", str(r["prepared_times"])]
+        cells += [
+            str(r["synchronized"]),
+            str(r.get("tiles", "")),
+            f"{r['peak_bytes'] / 1e9:.2f} GB",
+        ]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
