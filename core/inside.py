@@ -23,7 +23,7 @@ from .hemicube import Hemicube
 from .light.environment import Environment
 from .light.layers import part_of
 from .light.light import PatchLight
-from .supports import BELL, BOX, LINEAR
+from .supports import BELL, BOX, LEANING, LINEAR
 
 # The place of each face in the unfolded hemicube, in faces from its left and top. Faces are seen
 # from inside. The back is in the middle, as the camera of an upright hemicube sees it.
@@ -112,8 +112,8 @@ def _box_of(support: str, parameters: NDArray) -> tuple[float, float, float, flo
     if support == BOX.name:
         u0, u1, v0, v1 = (float(p) for p in parameters)
         return u0, u1, v0, v1
-    if support == BELL.name:
-        u, across, v, along = (float(p) for p in parameters)
+    if support in (BELL.name, LEANING.name):
+        u, across, v, along = (float(p) for p in parameters[:4])
         return max(u - across, 0), min(u + across, 1), max(v - along, 0), min(v + along, 1)
     if support == LINEAR.name:
         # the model knows the middle alone, which is drawn as a mark

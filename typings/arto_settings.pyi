@@ -23,7 +23,7 @@ class Settings:
     memory: int
     keep: Literal["never", "fits", "always"]
     keep_limit: float
-    support: Literal["auto", "whole", "linear", "box", "quadratic", "oriented_box", "gaussian", "double", "bell", "search", "stage_and_matte"]
+    support: Literal["auto", "whole", "linear", "box", "quadratic", "oriented_box", "gaussian", "double", "bell", "leaning", "search", "stage_and_matte"]
     separate: bool
     own_lamps: float
     lamps: bool

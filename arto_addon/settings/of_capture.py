@@ -39,6 +39,7 @@ _SUPPORTS = {
     "oriented_box": ("Oriented Box", "A tilted rectangle; needs the pattern uv"),
     "gaussian": ("Gaussian", "A tilted elliptical Gaussian; needs the pattern uv"),
     "bell": ("Bell", "As the box, but round at its rim"),
+    "leaning": ("Leaning Bell", "A bell along a slant; needs the pattern uv"),
     "double": ("Two Components", "A broad base and a narrow box; needs the pattern uv"),
     "search": ("Paper's Search", "The box by the paper's Algorithm 1; slow"),
     "stage_and_matte": ("Light Stage and Matte", "A box in the brightest patch, whole the others"),

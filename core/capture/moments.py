@@ -96,13 +96,14 @@ class Moments:
             tuple(c.select(pixels) for c in self.channels),
         )
 
-    def spread(self, variances: NDArray, where: NDArray[np.bool_]) -> Moments:
-        """Give some of the pixels other variances.
+    def spread(self, spreads: NDArray, where: NDArray[np.bool_]) -> Moments:
+        """Give some of the pixels another spread.
 
         Parameters
         ----------
-        variances : (2, n) float
-            Along u and v. They are held within what a transport of the pixel's mean can have.
+        spreads : (3, n) float
+            The variances along u and v, and the covariance. They are held within what a transport
+            of the pixel's mean can have.
         where : (n,) bool
             The pixels that get them.
 
@@ -111,10 +112,14 @@ class Moments:
         Moments
         """
         out = self.normalised.copy()
-        for mean, square, variance in zip((U, V), (UU, VV), variances, strict=True):
+        for mean, square, variance in zip((U, V), (UU, VV), spreads[:2], strict=True):
             middle = out[mean][where]
             room = middle * (1 - middle)
             out[square][where] = middle**2 + np.clip(variance[where], 0, room)
+        # a covariance is at most the root of both variances
+        u, v = out[U][where], out[V][where]
+        most = np.sqrt((out[UU][where] - u * u) * (out[VV][where] - v * v))
+        out[UV][where] = u * v + np.clip(spreads[2][where], -most, most)
         return replace(self, normalised=out)
 
     @property

@@ -20,11 +20,12 @@ from ..hemicube import Hemicube
 from ..measure import box_averages, box_of
 from ..patterns import UU, VV, U, V
 from ..region import Region
-from ..supports import BELL, BOX, LINEAR, WHOLE
+from ..supports import BELL, BOX, LEANING, LINEAR, WHOLE
 from ..supports.bell import bells_of, moments_of
 from .tile_writer import TileWriter
 
 FACTORS = (2, 4, 8)
+BELLS = BELL.code, LEANING.code
 
 
 def proxies(tile: TileWriter, hemicube: Hemicube, first: bool = True) -> dict[int, TileWriter]:
@@ -46,7 +47,7 @@ def proxies(tile: TileWriter, hemicube: Hemicube, first: bool = True) -> dict[in
         By how many pixels a side one pixel of the proxy covers.
     """
     found: dict[int, TileWriter] = {}
-    if not set(tile.models) <= {WHOLE.code, LINEAR.code, BOX.code, BELL.code}:
+    if not set(tile.models) <= {WHOLE.code, LINEAR.code, BOX.code, *BELLS}:
         return found
     last, y = tile, tile.region.y
     for factor in FACTORS:
@@ -124,7 +125,7 @@ def _merge(
     light = np.zeros((3, grid.half.pixels))
     # sums of R, all channels, times the mean place; and of the boxes' alone, with the squares
     places = np.zeros((2, grid.half.pixels))
-    kinds = [code for code, *_ in entries if code in (BOX.code, BELL.code)]
+    kinds = [code for code, *_ in entries if code in (BOX.code, *BELLS)]
     boxes = np.zeros((5, grid.half.pixels if kinds else 0))
     for code, pixels, coefficient, parameters in entries:
         size = coefficient[0] + coefficient[1] + coefficient[2]
@@ -132,8 +133,9 @@ def _merge(
             row += grid.total(pixels, channel)
         if code in kinds:
             given = parameters.T / np.float64(65535)
-            if code == BELL.code:
-                u, uu, v, vv = moments_of(given, extent)
+            if code in BELLS:
+                # a proxy's bells do not lean: its pixels are many of the field's
+                u, uu, v, vv = moments_of(given[:, :4], extent)
             else:
                 averages = box_averages(given, extent)
                 u, uu, v, vv = (averages[m] for m in (U, UU, V, VV))
@@ -155,5 +157,11 @@ def _merge(
     if len(narrow):
         _, u, v, uu, vv = boxes[:, narrow] / boxes[0, narrow]
         spread = np.maximum(uu - u * u, 0), np.maximum(vv - v * v, 0)
-        shaped = bells_of if kinds[0] == BELL.code else box_of
-        half.add_entries(kinds[0], narrow, light[:, narrow], shaped((u, v), spread, extent).T)
+        bells = kinds[0] in BELLS
+        shaped = bells_of if bells else box_of
+        half.add_entries(
+            BELL.code if bells else BOX.code,
+            narrow,
+            light[:, narrow],
+            shaped((u, v), spread, extent).T,
+        )

@@ -180,19 +180,19 @@ def box_of_neighbours(
         pool = pooled(moments, sizes, grain, pixels, shape, some if alike else None)
         of = weighed(moments.select(some), hits[some], pool)
         more = np.maximum(n[some], pool.paths + 1)
-        return of, _shown_box(means[:, some], of, even, more, extent, broad)
+        return of, _shown_box(means[:, some], of[:2], even, more, extent, broad)
 
-    variances, box = judged(np.arange(len(pixels)), False)
+    spreads, box = judged(np.arange(len(pixels)), False)
     # what any neighbours make a box, those of about its own size must
     asked = np.flatnonzero(box if surely is None else box | surely)
     if len(asked):
-        variances[:, asked], box[asked] = judged(asked, True)
+        spreads[:, asked], box[asked] = judged(asked, True)
     if surely is not None:
         box |= surely
     # the middle of n paths scatters about the support's by 1 / n of its variance, which is so much
     # of a blur already: a box that is less wide by that is unbiased over pixels
-    variances = variances * (1 - 1 / np.maximum(n, 1))
-    return box, moments.spread(variances, box)
+    spreads = spreads * (1 - 1 / np.maximum(n, 1))
+    return box, moments.spread(spreads, box)
 
 
 def _shown_box(

@@ -19,8 +19,8 @@ A patch that is seen by diffuse paths alone has no sharp entry:
 >>> basis[:2] = 0.5
 >>> known = evidence(np.full((1, 1), 1.5, np.float32), (1, 1), np.ones(1))
 >>> found = choose_lobes(basis, pattern_set("lobes"), known, 0, np.arange(1), (-1, 1, -1, 1))
->>> len(found.sharp)
-0
+>>> found.sharp
+()
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ from ..capture.moments import Moments, normalise
 from ..field.tile_writer import TileWriter
 from ..measure import Extent, uniform_moments
 from ..patterns import ONE, UU, UV, VV, LobedSet, U, V, channel_sum
-from ..supports import BELL, LINEAR, NOTHING, WHOLE
+from ..supports import BELL, LEANING, LINEAR, NOTHING, WHOLE
+from ..supports.leaning import LEANS, correlation
 from .choice import CENTRED, box_of_neighbours
 from .evidence import Evidence
 from .pooled import hits_of
@@ -43,6 +44,27 @@ from .pooled import hits_of
 BROAD_SHARP = 0.6
 # Share of a pixel's light from which on all that is sharp in it is a bell.
 MOSTLY = 0.5
+
+
+@dataclass(frozen=True)
+class Sharp:
+    """Entries of a sharp lobe that share a model.
+
+    Parameters
+    ----------
+    code : int
+        Of the model.
+    pixels : (m,) int
+        Which of the n pixels have one.
+    light : (3, m) float32
+        Their reflection coefficients.
+    parameters : (p, m) float
+    """
+
+    code: int
+    pixels: NDArray[np.intp]
+    light: NDArray[np.float32]
+    parameters: NDArray
 
 
 @dataclass(frozen=True)
@@ -57,20 +79,14 @@ class Lobes:
         The reflection coefficients of these.
     parameters : dict of int to (m, p) float
         The parameters of each code in use.
-    sharp : (m,) int
-        Which of the n pixels have an entry of the sharp lobe.
-    light : (3, m) float32
-        The reflection coefficients of the sharp entries.
-    boxes : (m, 4) float
-        Their parameters.
+    sharp : tuple of Sharp
+        The entries of the sharp lobe, by model.
     """
 
     codes: NDArray[np.uint8]
     coefficient: NDArray[np.float32]
     parameters: dict[int, NDArray]
-    sharp: NDArray[np.intp]
-    light: NDArray[np.float32]
-    boxes: NDArray
+    sharp: tuple[Sharp, ...]
 
 
 def choose_lobes(
@@ -113,7 +129,7 @@ def choose_lobes(
     sizes = sharp[ONE]
     some = np.flatnonzero(sizes > 0)
     box = np.zeros(len(pixels), bool)
-    boxes = np.empty((0, 4))
+    sharps: list[Sharp] = []
     if len(some):
         seen = pixels[some]
         moments = Moments(parts[1][0][some], normalise(sharp[:, some], extent), extent)
@@ -126,7 +142,14 @@ def choose_lobes(
         # one too small to be an entry by itself is better off with the base
         shown &= known.kept_of(k, seen, sizes[some])
         box[some[shown]] = True
-        boxes = BELL.fit(moments.select(shown))
+        leans = np.abs(correlation(moments)) > LEANS
+        for support, of in ((BELL, ~leans), (LEANING, leans)):
+            here = np.flatnonzero(shown & of)
+            if len(here):
+                light = parts[1][0][some[here]].T
+                sharps.append(
+                    Sharp(support.code, some[here], light, support.fit(moments.select(here)).T)
+                )
     total = base + np.where(box, 0, sharp)
     total[[UU, VV, UV]] = np.nan
     left = normalise(total, extent)
@@ -146,8 +169,7 @@ def choose_lobes(
         if here.any():
             used = [U, V] if support is LINEAR else []
             parameters[support.code] = left[used][:, here].T
-    which = np.flatnonzero(box)
-    return Lobes(codes, coefficient, parameters, which, parts[1][0][which].T, boxes)
+    return Lobes(codes, coefficient, parameters, tuple(sharps))
 
 
 def write_lobes(
@@ -174,5 +196,6 @@ def write_lobes(
     codes[lit] = lobes.codes
     left = np.array(coefficient)
     left[lit] = lobes.coefficient
-    writer.add_entries(BELL.code, lit[lobes.sharp], lobes.light, lobes.boxes.T)
+    for sharp in lobes.sharp:
+        writer.add_entries(sharp.code, lit[sharp.pixels], sharp.light, sharp.parameters)
     writer.add(codes, left, lobes.parameters)

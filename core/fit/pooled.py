@@ -44,13 +44,13 @@ class Pool:
 
     Parameters
     ----------
-    variance : (2, n) float32
-        Along u and v, without bias.
+    spread : (3, n) float32
+        The variances along u and v and the covariance, without bias.
     paths : (n,) float32
         How many light paths tell it. Each pixel adds one less than it has.
     """
 
-    variance: NDArray[np.float32]
+    spread: NDArray[np.float32]
     paths: NDArray[np.float32]
 
 
@@ -88,12 +88,12 @@ def pooled(
     pairs = 1 - np.square(grain.astype(np.float32) / np.where(sizes > 0, sizes, 1))
     told = np.isfinite(pairs) & (sizes > 0)
     pairs = np.where(told, np.maximum(pairs, 0), 0)
-    own = np.stack([*moments.variance, pairs, told]).astype(np.float32)
-    own[:2] *= told
+    own = np.stack([*moments.variance, moments.covariance, pairs, told]).astype(np.float32)
+    own[:3] *= told
     own[~np.isfinite(own)] = 0
     half = WINDOW // 2
     height, width = shape
-    image = np.zeros((4, height + 2 * half, width + 2 * half), np.float32)
+    image = np.zeros((5, height + 2 * half, width + 2 * half), np.float32)
     y, x = np.divmod(pixels, width)
     image[:, y + half, x + half] = own
     if among is None:
@@ -102,13 +102,13 @@ def pooled(
         size = np.zeros(image.shape[1:], np.float32)
         size[y + half, x + half] = sizes
         found = _alike(image, size, sizes[among], y[among], x[among])
-    spread, all_pairs, count = found[:2], found[2], found[3]
+    sums, all_pairs, count = found[:3], found[3], found[4]
     # of m pairs a pixel, as one less 1 / n of n paths
     each = all_pairs / np.maximum(count, 1)
     paths = count * each / np.maximum(1 - each, 1e-3)
-    variance = spread / np.maximum(all_pairs, 1e-6)
-    variance[:, all_pairs < 1e-3] = np.nan
-    return Pool(variance, paths.astype(np.float32))
+    spread = sums / np.maximum(all_pairs, 1e-6)
+    spread[:, all_pairs < 1e-3] = np.nan
+    return Pool(spread, paths.astype(np.float32))
 
 
 def hits_of(
@@ -178,7 +178,7 @@ def _alike(
 
 
 def weighed(moments: Moments, hits: NDArray, pool: Pool) -> NDArray[np.float32]:
-    """Mix the variances of entries with those of their pools.
+    """Mix the spreads of entries with those of their pools.
 
     Parameters
     ----------
@@ -190,13 +190,13 @@ def weighed(moments: Moments, hits: NDArray, pool: Pool) -> NDArray[np.float32]:
 
     Returns
     -------
-    (2, n) float32
-        The pool's variances, and the entries' own where these have paths enough.
+    (3, n) float32
+        The pool's variances and covariance, and the entries' own where these have paths enough.
     """
-    own = np.stack(moments.variance)
+    own = np.stack([*moments.variance, moments.covariance])
     more = np.maximum(hits - 1, 0)
     with np.errstate(invalid="ignore"):
         unbiased = own * np.where(np.isinf(hits), 1, hits / np.maximum(more, 0.5))
         share = np.where(np.isinf(more), 1, more / (more + POOL))
-        mixed = share * unbiased + (1 - share) * pool.variance
+        mixed = share * unbiased + (1 - share) * pool.spread
     return np.where(np.isfinite(mixed), mixed, own).astype(np.float32)

@@ -88,9 +88,10 @@ def test_a_coat_on_paint_is_two_entries(planted, extent) -> None:
     paint = np.array([[0.5, 0.02, 0.0], [0.4, 0.3, 0.2]])
     coat = np.full((2, 3), 0.04)
     found = chosen(both(planted, base, paint, sharp, coat, extent), extent=extent)
-    assert found.sharp.tolist() == [0, 1]
-    np.testing.assert_allclose(found.boxes, about(np.array(sharp)), atol=1e-5)
-    np.testing.assert_allclose(found.light, coat.T, rtol=1e-12)
+    (bells,) = found.sharp
+    assert bells.code == BELL.code and bells.pixels.tolist() == [0, 1]
+    np.testing.assert_allclose(bells.parameters.T, about(np.array(sharp)), atol=1e-5)
+    np.testing.assert_allclose(bells.light, coat.T, rtol=1e-12)
     np.testing.assert_allclose(found.coefficient, paint, rtol=1e-12)
     assert set(found.codes.tolist()) <= {WHOLE.code, LINEAR.code}
 
@@ -106,7 +107,7 @@ def test_what_is_broad_is_one_entry_of_all_light(planted) -> None:
 def test_a_base_too_dark_to_keep_goes_to_the_rest(planted) -> None:
     base, sharp = [[0.0, 1.0, 0.0, 1.0]], [[0.3, 0.31, 0.3, 0.31]]
     found = chosen(both(planted, base, np.full((1, 3), 1e-9), sharp, np.ones((1, 3))))
-    assert found.codes.tolist() == [NOTHING] and found.sharp.tolist() == [0]
+    assert found.codes.tolist() == [NOTHING] and found.sharp[0].pixels.tolist() == [0]
 
 
 def test_a_mirror_pixel_is_a_bell_however_few_its_paths(planted) -> None:

@@ -20,15 +20,17 @@ COLOUR = np.array([0.3, 0.5, 0.2])
 
 class Seen:
     """Pixels whose patch is met by a random number of paths, each of them in a square of its
-    pixel's own middle (2, n) and half width (n,)."""
+    pixel's own middle (2, n) and half width (n,), the correlation of both places being `lean`."""
 
-    def __init__(self, seed: int, paths, middle, half, weight=1.0) -> None:
+    def __init__(self, seed: int, paths, middle, half, weight=1.0, lean=0.0) -> None:
         rng = np.random.default_rng(seed)
         count = rng.poisson(np.broadcast_to(paths, PIXELS))
         most = max(1, count.max())
         there = np.arange(most)[:, None] < count
         weights = there * weight * rng.uniform(0.5, 1.5, (most, PIXELS))
-        u, v = middle[:, None] + half * rng.uniform(-1, 1, (2, most, PIXELS))
+        places = rng.uniform(-1, 1, (2, most, PIXELS))
+        places[1] = lean * places[0] + np.sqrt(1 - lean * lean) * places[1]
+        u, v = middle[:, None] + half * places
         self.basis = np.einsum("kmn,mn->kn", monomials(u, v), weights)[..., None] * COLOUR
         self.sizes = weights.sum(axis=0)
         self.grain = (weights * rng.choice([-1.0, 1.0], weights.shape)).sum(axis=0)
@@ -51,16 +53,21 @@ def anywhere(seed: int) -> np.ndarray:
 
 @pytest.mark.parametrize("paths", [2, 20])
 @pytest.mark.parametrize("half", [0.02, 0.2])
-def test_the_pool_has_no_bias_at_any_number_of_paths(paths: float, half: float) -> None:
+@pytest.mark.parametrize("lean", [0.0, 0.8])
+def test_the_pool_has_no_bias_at_any_number_of_paths(
+    paths: float, half: float, lean: float
+) -> None:
     """However far the pixels' middles are apart."""
-    seen = Seen(1, paths, anywhere(2), np.full(PIXELS, half))
+    seen = Seen(1, paths, anywhere(2), np.full(PIXELS, half), lean=lean)
     lit = np.flatnonzero(seen.sizes > 0)
     found = pooled(seen.moments().select(lit), seen.sizes[lit], seen.grain[lit], lit, SHAPE)
-    pairs = np.isfinite(found.variance[0])
+    pairs = np.isfinite(found.spread[0])
     # windows that have pairs: their sums scatter about the truth
     weight = found.paths[pairs]
-    for variance in found.variance[:, pairs]:
+    for variance in found.spread[:2, pairs]:
         assert np.average(variance, weights=weight) == pytest.approx(half**2 / 3, rel=0.15)
+    covariance = np.average(found.spread[2, pairs], weights=weight)
+    assert covariance / (half**2 / 3) == pytest.approx(lean, abs=0.15)
 
 
 @pytest.mark.parametrize("paths", [0.2, 1, 3])
