@@ -13,7 +13,10 @@ False
 from __future__ import annotations
 
 import hashlib
+import os
 import re
+import unicodedata
+from pathlib import Path
 from typing import Any
 
 # Names that Windows keeps for devices, whatever ending they have.
@@ -78,3 +81,68 @@ def is_plain_name(value: Any) -> bool:
     if not isinstance(value, str) or not _NAME.fullmatch(value) or value.endswith((" ", ".")):
         return False
     return value.split(".")[0].strip().upper() not in DEVICES
+
+
+def folded(path: Path) -> str:
+    r"""Write a path so that all its spellings are one text: for names that are not there yet.
+
+    Links are followed. Disks of Windows and macOS do not tell upper from lower case, nor an
+    accented letter from a letter with its accent.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> folded(Path("/x/Caf\u00e9.EXR")) == folded(Path("/x/cafe\u0301.exr"))
+    True
+    """
+    text = unicodedata.normalize("NFC", os.path.realpath(path)).casefold()
+    return unicodedata.normalize("NFC", text)
+
+
+def same_file(one: Path, other: Path) -> bool:
+    """Say whether two paths lead to one file.
+
+    Where both are there, the system says so. Otherwise their names decide, see `folded`.
+
+    Parameters
+    ----------
+    one, other : Path
+
+    Returns
+    -------
+    bool
+    """
+    try:
+        return one.samefile(other)
+    except OSError:
+        return folded(one) == folded(other)
+
+
+def is_text(path: Path) -> bool:
+    r"""Say whether a path is text, which every library takes, and not any bytes.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> is_text(Path("shot.exr")), is_text(Path("sh\udcfft.exr"))
+    (True, False)
+    """
+    try:
+        str(path).encode("utf-8")
+    except UnicodeEncodeError:
+        return False
+    return "\0" not in str(path)

@@ -32,6 +32,7 @@ class Settings:
     environment_width: int
     look: str
     output: str
+    overwrite: bool
     layers: Literal["OFF", "FACES", "GROUPS"]
     layer_prefix: str
     layers_files: Literal["ONE", "EACH"]

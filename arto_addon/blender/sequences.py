@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -79,6 +80,47 @@ def number_of(path: Path) -> int | None:
 
 
 _DIGITS = re.compile(r"(\d+)(?=\D*$)")
+
+
+def form_of(name: str) -> str:
+    """The form, for `re.fullmatch`, of the names of a sequence's files. name: of any of them."""
+    stem, dot, suffix = name.rpartition(".")
+    digits = _DIGITS.search(stem or suffix)
+    if not digits:
+        return re.escape(name)
+    begin, end = (stem or suffix)[: digits.start()], (stem or suffix)[digits.end() :]
+    return rf"{re.escape(begin)}\d+{re.escape(end + (dot + suffix if stem else ''))}"
+
+
+_TILES = {"<UDIM>": r"\d{4}", "<UVTILE>": r"u\d+_v\d+"}
+
+
+def form_of_tiles(name: str) -> str:
+    """The form, for `re.fullmatch`, of the names of all tiles of an image."""
+    form = re.escape(name)
+    for token, number in _TILES.items():
+        form = form.replace(re.escape(token), number)
+    return form
+
+
+def files_of(image: bpy.types.Image, timings: Iterable[Timing] = (), frame: int = 0) -> list[Path]:
+    """The files that an image is read from; none where it is in no file.
+
+    timings: the users or nodes that show a sequence, at a frame of the scene.
+    """
+    if image.packed_files or image.source not in {"FILE", "TILED", "SEQUENCE", "MOVIE"}:
+        return []
+    path = Path(bpy.path.abspath(image.filepath, library=image.library))
+    if image.source == "SEQUENCE":
+        return sorted({file_of(path, shown_at(timing, frame).number) for timing in timings})
+    if image.source == "TILED":
+        return [path.with_name(_of_tile(path.name, tile.number)) for tile in image.tiles]
+    return [path]
+
+
+def _of_tile(name: str, number: int) -> str:
+    u, v = (number - 1001) % 10 + 1, (number - 1001) // 10 + 1
+    return name.replace("<UDIM>", str(number)).replace("<UVTILE>", f"u{u}_v{v}")
 
 
 def whole_size(path: Path, finite: bool = False) -> tuple[int, int] | None:

@@ -13,28 +13,27 @@ from pathlib import Path
 from types import TracebackType
 
 from ...core import exr, marked
-from ...core.errors import ArtoError, ExrError
+from ...core.errors import ExrError
 from ...core.files import whole
+from . import marks
+from .marks import ENDINGS, is_of
 from .plate import LAYERS, full_file, layers_prefix
-
-# The attribute in the header of each file of a plate that names the plate's own file.
-PLATE = "arto.plate"
-# Attributes that files of earlier versions have, which do not name their plate.
-_OF_EARLIER = ("arto.light key", "arto.verify")
-# What the names of files beside a plate end with.
-ENDINGS = ("catcher", "light", "layers", "data", "comp", "verify")
 
 
 class Together:
     """A context manager in which the files of a plate are written.
 
     At the end of the block the files take their names, the plate's own file last. If the block
-    fails, nothing is changed. Raises ExrError where a file cannot be put in its place.
+    fails, nothing is changed. Raises ExrError where a file cannot be put in its place, SceneError
+    where it would be written over a file of others (`marks`).
     """
 
-    def __init__(self, plate: Path, prefix: str | None) -> None:
-        """prefix: of the names of layers' own files; None where there are no such files."""
-        self.plate = plate
+    def __init__(self, plate: Path, prefix: str | None, overwrite: bool = False) -> None:
+        """prefix: of the names of layers' own files; None where there are no such files.
+
+        overwrite: whether files of others are written over.
+        """
+        self.plate, self.overwrite = plate, overwrite
         self.written: list[Path] = []
         self.removed: list[Path] = []
         known = (prefix, older_prefix(plate))
@@ -43,6 +42,7 @@ class Together:
         self._partial: Path | None = None
 
     def __enter__(self) -> Together:
+        marks.check(self.plate, self.plate, self.overwrite)
         try:
             # entered first, so put in its place last
             self._partial = self._held.enter_context(whole(self.plate))
@@ -57,6 +57,7 @@ class Together:
             assert self._partial is not None
             yield self._partial
         else:
+            marks.check(path, self.plate, self.overwrite)
             yield self._held.enter_context(whole(path))
         self.written.append(path)
 
@@ -107,17 +108,3 @@ def beside(plate: Path, prefixes: set[str]) -> list[Path]:
         names = (path for path in plate.parent.iterdir() if path.suffix == ".exr")
         there |= {path for path in names if path.name.startswith(begins)}
     return sorted(there)
-
-
-def is_of(path: Path, plate: Path) -> bool:
-    """Whether ARTO has written a file beside a plate, by what the file's header says."""
-    try:
-        head = exr.header(path)
-    except ArtoError:
-        return False
-    if PLATE in head:
-        return str(head[PLATE]) == plate.name
-    # the names of layers' own files are the artist's: another plate may have such a name
-    named = any(path.stem == f"{plate.stem}_{e}" for e in (*ENDINGS, "full"))
-    named = named or any(path.stem == f"{plate.stem}_{e}_full" for e in ENDINGS)
-    return named and any(name in head for name in _OF_EARLIER)

@@ -19,7 +19,8 @@ from ..stage.small import parts_of
 from ..stage.stage import stage
 from ..work import Progress, Steps
 from ..world.own import gains_of
-from . import plate
+from . import marks, plate
+from .marks import PLATE
 from .names import relit_file
 
 # Samples of each of the two renders.
@@ -42,6 +43,8 @@ def verify_plate(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps
     path = relit_file(scene)
     if not path.is_file():
         raise SceneError(f"there is no plate {path} to verify: press Relight first")
+    out = verify_file(path)
+    marks.check(out, path, scene.arto.overwrite)
     there = next(iter(exr.read(path).values()))
     renders: list[NDArray[np.float32]] = []
     for seed in (1, 2):
@@ -73,7 +76,7 @@ def verify_plate(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps
     ratio = 2 * SAMPLES / samples
     found = verify(there[..., :3], renders[0][..., :3], renders[1][..., :3], own=ratio)
     told = {"verify": said(scene, found), "samples": f"2 x {SAMPLES}"}
-    out = verify_file(path)
+    told[PLATE.removeprefix("arto.")] = path.name
     # All pixels are written, whatever the plate's windows: only Blender shows this file.
     exr.write(out, {"": marked(there, found)}, *plate.header_of(scene, told))
     yield Progress(1.0, told["verify"])

@@ -6,39 +6,29 @@ all pictures that were asked for.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
 
 from ...core.errors import ArtoError, CaptureSetError, SceneError, StrictError
-from ...core.files import is_writable
-from ...core.units import size
+from ...core.file_names import folded
 from ..blender import denoise, sequences
-from ..capture import room
 from ..capture.sequence import frame_kept
 from ..plate import mattes, plate
-from ..plate.footage import footage
 from ..plate.names import numbers_frames, of_look, relit_file
-from ..plate.together import ENDINGS
 from ..shot import paths
 from ..shot.shot import check_same_shot, shot_of
 from ..work import Progress, Steps
 from ..world.check import check_file, check_images, check_world, differs_by_rays
-from ..world.images import files_at, image_nodes
-from . import layers
+from .inputs import inputs
+from .outputs import bytes_of, check_picture, check_room
 from .shown import Shown, check_film
 
 # Said in a warning, and in the header of the plate.
 NO_DENOISER = "no: this Blender was built without Open Image Denoise"
 GLASS = "opaque: what is seen through it is in it, whatever Transparent Glass says"
-# How small compressed files of pictures are, as a share of their pixels, where they are small: a
-# disk that has room for so much may still become full, and one that has not is told of at once.
-_PACKED = 0.5
-# The longest name of a file that disks take, in bytes.
-_LONGEST = 255
 
 
 @dataclass(frozen=True)
@@ -94,6 +84,7 @@ def look(
     wrong = same_names(pictures)
     wrong |= {p: e for p in pictures if p.file and p not in wrong and (e := _map(p.file))}
     missing = missing_frames(scene, view_layer, [p.frame for p in pictures if p.frame is not None])
+    read = inputs(scene, [p.file for p in pictures if p.file])
     still = None
     needed: dict[Path, int] = {}
     rendered: dict[Path, int] = {}
@@ -116,12 +107,12 @@ def look(
                 continue
             for one in some:
                 try:
-                    check_picture(still, one.path, file=one.file)
+                    check_picture(still, one.path, read)
                     needed[one.path] = bytes_of(still)
                 except ArtoError as e:
                     wrong[one] = e
     try:
-        _check_room(needed)
+        check_room(needed)
     except ArtoError as e:
         wrong |= {p: e for p in pictures if p not in wrong}
     return wrong
@@ -131,8 +122,7 @@ def same_names(pictures: Sequence[Wanted]) -> dict[Wanted, ArtoError]:
     """Find pictures that would be written over another one -> what is wrong, by picture."""
     by_name: dict[str, list[Wanted]] = {}
     for one in pictures:
-        # Windows and macOS do not tell upper from lower case in names
-        by_name.setdefault(str(one.path).casefold(), []).append(one)
+        by_name.setdefault(folded(one.path), []).append(one)
     wrong: dict[Wanted, ArtoError] = {}
     for same in by_name.values():
         if len(same) > 1:
@@ -228,12 +218,12 @@ def check_looks(shown: Shown, looks: Mapping[str, tuple[Path, bpy.types.World]])
     check_frame(shown, own_world=False, strict=False)
     by_path: dict[str, str] = {}
     for name, (path, world) in looks.items():
-        if (other := by_path.setdefault(str(path).casefold(), name)) != name:
+        if (other := by_path.setdefault(folded(path), name)) != name:
             raise SceneError(
                 f"the looks '{other}' and '{name}' would be written to one picture, {path.name}: "
                 "give one of them another name"
             )
-        check_picture(shown, path, world)
+        check_picture(shown, path)
         check_images(world, shown.scene.frame_current)
 
 
@@ -276,96 +266,3 @@ def warnings(shown: Shown, world: bpy.types.World | None) -> list[str]:
         lacks = f"the data file has no {', '.join(missing)}"
         out.append(f"{lacks}: it was not captured; capture again to have it")
     return out
-
-
-def check_picture(
-    shown: Shown, path: Path, world: bpy.types.World | None = None, file: Path | None = None
-) -> None:
-    """Look at where a picture and the files beside it will be written.
-
-    world: that is shown (default: the scene's); file: an environment map instead. Raises SceneError
-    where they cannot be written there, or would be written over what they are made of.
-    """
-    scene = shown.scene
-    layers.check(scene, path, shown.field)
-    outputs = [path, *(path.with_name(f"{path.stem}_{ending}.exr") for ending in ENDINGS)]
-    outputs += [plate.full_file(output) for output in outputs]
-    longest = max(len(output.name.encode("utf-8", "surrogatepass")) for output in outputs)
-    if longest > _LONGEST:
-        raise SceneError(
-            f"'{path.name}' and what is added to it for files beside it is {longest} bytes long, "
-            f"and disks take {_LONGEST}: shorten the output's name"
-        )
-    if path.is_dir():
-        raise SceneError(f"{path} is a folder: choose another output")
-    if not is_writable(path.parent):
-        raise SceneError(
-            f"nothing can be written into {path.parent}: see who may write there, or choose "
-            "another output"
-        )
-    taken = {_real(output) for output in outputs}
-    for what, read in _inputs(shown, world, file):
-        if _real(read) in taken:
-            raise SceneError(
-                f"the picture would be written over {what}, {read}: choose another output"
-            )
-    _check_room({path: bytes_of(shown)})
-
-
-def _real(path: Path) -> str:
-    return os.path.normcase(os.path.realpath(path))
-
-
-def _inputs(
-    shown: Shown, world: bpy.types.World | None, file: Path | None
-) -> Iterable[tuple[str, Path]]:
-    """The files that a picture is made of, with what they are in words."""
-    scene = shown.scene
-    if file:
-        yield "its environment map", file
-    else:
-        world = world or check_world(scene, shown.layer)
-        for node in image_nodes(world):
-            for path in files_at(node, scene.frame_current):
-                yield "the world's image", path
-    if (found := footage(scene)) and (filmed := found.file(scene)):
-        yield "the footage", filmed
-    if rendered := mattes.file_of(scene, shown.field):
-        yield "the Cryptomattes", rendered
-
-
-def bytes_of(shown: Shown) -> int:
-    """About the bytes of a picture on disk, with the files beside it; rather too few."""
-    settings, (height, width) = shown.scene.arto, shown.field.shape
-    shown_twice = 1 + plate.window_of(shown.scene).crop
-    a_pixel = 16 * shown_twice
-    if len(shown.takes) > 1:
-        a_pixel += 12 * shown_twice + 12
-    if settings.write_data:
-        a_pixel += 4 * sum(len(letters) for letters in plate.DATA.values())
-        a_pixel += 48 if settings.cryptomatte else 0
-    if settings.layers != "OFF":
-        parts = len(settings.groups) + 1 if settings.layers == "GROUPS" else 6
-        a_pixel += (6 if settings.layers_half else 12) * parts * shown_twice
-    return round(a_pixel * height * width * _PACKED)
-
-
-def _check_room(needed: Mapping[Path, int]) -> None:
-    """Raise SceneError where a disk has no room for pictures. needed: bytes by the pictures' paths.
-
-    A picture takes the place of an older one, which counts as room.
-    """
-    by_folder: dict[Path, int] = {}
-    for path, more in needed.items():
-        there = path.parent
-        while not there.exists() and there != there.parent:
-            there = there.parent
-        old = path.stat().st_size if path.is_file() else 0
-        by_folder[there] = by_folder.get(there, 0) + max(more - old, 0)
-    for folder, more in by_folder.items():
-        free = room.free_disk(folder)
-        if free < more:
-            raise SceneError(
-                f"the pictures need about {size(more)} of disk, and {folder} has {size(free)} "
-                "free: make room, or choose another output"
-            )

@@ -16,6 +16,8 @@ from ...core.light.layers import part_of
 from ..blender.colour import working_space
 from ..blender.compositing import compositor
 from ..blender.nodes import new_world
+from ..plate import marks
+from ..plate.marks import PLATE
 from ..plate.mixer import EXPOSURE_SOCKET, SOURCE
 from ..plate.names import relit_file
 from ..plate.plate import layers_file, shown_file, world_file
@@ -84,6 +86,8 @@ def mix_to_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> Path:
             f"the layers are of the world '{lit}', and the scene has '{world.name}': relight first"
         )
     _check_lamps(scene, mix)
+    world_exr = world_file(path)
+    marks.check(world_exr, path, settings.overwrite)
     whole = kept.environment(scene, settings.environment_width, layer)
     image = np.zeros_like(whole.image)
     left = np.ones(whole.image.shape[:2], np.float32)
@@ -93,12 +97,11 @@ def mix_to_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> Path:
         left -= share
     # light from where no patch is lights nothing, but the camera sees it
     image += whole.image * np.maximum(left, 0)[..., None] * np.float32(2.0**mix.exposure)
-    path = world_file(path)
-    exr.write(path, {"": image}, None, working_space())
+    exr.write(world_exr, {"": image}, {PLATE: path.name}, working_space())
     _gain_lamps(scene, mix)
-    scene.world = _world_showing(path, whole.turn)
+    scene.world = _world_showing(world_exr, whole.turn)
     scene.view_layers[layer].world_override = None
-    return path
+    return world_exr
 
 
 def _layer_of(scene: bpy.types.Scene, thing: bpy.types.Object) -> str:

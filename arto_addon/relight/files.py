@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ...core.catcher import Caught
 from ...core.exr.writing import Opener
 from ..plate import plate
-from ..plate.together import PLATE, Together
+from ..plate.marks import PLATE
+from ..plate.together import Together
 from ..work import Progress, Steps, Wrote
 from . import ahead, layers
 from .shown import Ready, Shown
@@ -61,7 +62,7 @@ def write(shown: Shown, ready: Ready, made: Made, about: dict[str, str]) -> Step
         about[plate.LAYERS.removeprefix("arto.")] = name
     about[PLATE.removeprefix("arto.")] = path.name
     single = settings.layers != "OFF" and settings.layers_files == "EACH"
-    together = Together(path, layers.prefix_of(scene) if single else None)
+    together = Together(path, layers.prefix_of(scene) if single else None, settings.overwrite)
     with together:
         yield from _written(shown, ready, made, about, together.file)
     for there in sorted(together.written, key=lambda there: there != path):

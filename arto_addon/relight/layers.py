@@ -65,10 +65,17 @@ def check(scene: bpy.types.Scene, path: Path, field: Field) -> None:
     if settings.layers == "GROUPS":
         _check(scene)
     if settings.layers_files == "EACH":
-        groups = [group.name for group in settings.groups]
-        parts = [*groups, REST] if settings.layers == "GROUPS" else list(FACE_NAMES)
-        own = field.own_layers if settings.own_lamps else []
-        layer_files(path, [channel_name(scene, name) for name in (*parts, *own, OWN, BEHIND)])
+        own_files(scene, path, field)
+
+
+def own_files(scene: bpy.types.Scene, path: Path, field: Field) -> list[Path]:
+    """The files of single layers that a plate may have. Raises SceneError, see `layer_files`."""
+    settings = scene.arto
+    groups = [group.name for group in settings.groups]
+    parts = [*groups, REST] if settings.layers == "GROUPS" else list(FACE_NAMES)
+    own = field.own_layers if settings.own_lamps else []
+    names = [channel_name(scene, name) for name in (*parts, *own, OWN, BEHIND)]
+    return list(layer_files(path, names).values())
 
 
 def _check(scene: bpy.types.Scene) -> None:

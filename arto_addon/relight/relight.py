@@ -31,6 +31,7 @@ from ..world.check import check_given, check_world, differs_by_rays
 from ..world.lamp_render import brightness, lamp_light, lamp_samples
 from ..world.own import own_of
 from . import ahead, files, light_key
+from .outputs import check_picture
 from .shown import Laps, Light, Ready, Shown, check_film
 
 # From this share of the light on, the lamps' picture and the field's are denoised as a single sum.
@@ -101,7 +102,7 @@ def make_ready(shown: Shown, lit: Light) -> Steps[Ready]:
     # raise before the long work what would be raised after it
     plate.window_of(scene).check(field.shape)
     check_film(scene, field)
-    ahead.check_picture(shown, lit.path, lit.world)
+    check_picture(shown, lit.path)
     shown.mattes()
     shown.filmed()
     for said in ahead.warnings(shown, world):

@@ -109,6 +109,19 @@ FILES = (
         panels=("Storage",),
     ),
     Setting(
+        name="overwrite",
+        kind="switch",
+        title="Write Over Other Files",
+        words="Write the relit picture and the files beside it also where files are that ARTO has "
+        "not written; these are lost. Never over what the picture is made of",
+        default=False,
+        work="relight",
+        decides=Decides.NOTHING,
+        farm=False,
+        option=True,
+        panels=("Storage",),
+    ),
+    Setting(
         name="layers",
         kind="choice",
         title="Layers",

@@ -21,7 +21,8 @@ from ...core.field.head import HEADER as FIELD_HEADER
 from ...core.field.tile_file import TileFile
 from ..capture.sequence import frame_kept
 from ..plate import plate
-from ..plate.together import beside, is_of, older_prefix
+from ..plate.marks import is_of
+from ..plate.together import beside, older_prefix
 from ..relight import ahead
 from ..relight.light_key import HEADER, light_key
 from ..shot import paths, status

@@ -113,6 +113,7 @@ class Storage(Draws):
         column.prop(settings, "folder", text="")
         say(column, context, "Relit Picture")
         column.prop(settings, "output", text="")
+        column.prop(settings, "overwrite")
         column.prop(settings, "compression", text="")
         column.prop(settings, "depth", text="")
         column.prop(settings, "keep", text="")

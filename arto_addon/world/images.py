@@ -35,20 +35,10 @@ def number_at(user: bpy.types.ImageUser, frame: int) -> int:
 
 def files_at(node: bpy.types.Node, frame: int) -> list[Path]:
     """The files that a node's image is read from at a frame; none where it is in no file."""
-    image = node.image
-    if image is None or image.packed_files or image.source not in {"FILE", "TILED", *_MOVE}:
+    if node.image is None:
         return []
-    path = Path(bpy.path.abspath(image.filepath, library=image.library))
-    if image.source == "SEQUENCE":
-        return [sequences.file_of(path, number_at(node.image_user, frame))]
-    if image.source == "TILED":
-        return [path.with_name(_of_tile(path.name, tile.number)) for tile in image.tiles]
-    return [path]
-
-
-def _of_tile(name: str, number: int) -> str:
-    u, v = (number - 1001) % 10 + 1, (number - 1001) // 10 + 1
-    return name.replace("<UDIM>", str(number)).replace("<UVTILE>", f"u{u}_v{v}")
+    timings = [node.image_user] if node.image.source == "SEQUENCE" else []
+    return sequences.files_of(node.image, timings, frame)
 
 
 def stamps(world: bpy.types.World, frame: int) -> list[object]:

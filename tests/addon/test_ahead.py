@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from arto.arto_addon import work
 from arto.arto_addon.plate.names import relit_file
-from arto.arto_addon.relight import ahead, many
+from arto.arto_addon.relight import many, outputs
 from arto.arto_addon.relight.looks import relight_looks
 from arto.arto_addon.work import Batch, Failed, Warned, Wrote
 from arto.core import exr
@@ -143,7 +143,7 @@ def test_a_picture_without_a_place_is_said_before(shot, maps, tmp_path, output, 
 
 
 def test_room_on_the_disk_is_looked_at(shot, maps, monkeypatch):
-    monkeypatch.setattr(ahead.room.shutil, "disk_usage", lambda _: SimpleNamespace(free=1))
+    monkeypatch.setattr(outputs.room.shutil, "disk_usage", lambda _: SimpleNamespace(free=1))
     said = relit(shot, worlds=[maps[0], maps[2]])
     assert isinstance(said.error, SceneError) and "make room" in str(said.error)
     assert not said.wrote

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from arto.arto_addon import work
-from arto.arto_addon.plate import mattes, plate, together
+from arto.arto_addon.plate import marks, mattes, plate
 from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.relight import layers, relight
 from arto.arto_addon.work import Wrote
@@ -67,7 +67,7 @@ def test_each_header_names_its_own_copy(shot):
     for file in (path, plate.layers_file(path)):
         assert exr.header(file)[plate.CROPPED] == f"{file.stem}_full.exr"
         assert plate.CROPPED not in exr.header(plate.full_file(file))
-        assert exr.header(file)[together.PLATE] == path.name
+        assert exr.header(file)[marks.PLATE] == path.name
     shot.arto.layers, shot.arto.data_window = "OFF", "FULL"
 
 
