@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from . import heavy_command, mirrors_command
+from . import heavy_command, mirrors_command, place_command
 
 
 def _demo(options: argparse.Namespace) -> None:
@@ -294,6 +294,7 @@ def main() -> int:
 
     mirrors_command.add(commands)
     heavy_command.add(commands)
+    place_command.add(commands)
 
     c = commands.add_parser("noise", help="where to take out the noise of a capture")
     c.add_argument("--json", type=Path, default=Path("out/noise.json"))

@@ -23,7 +23,7 @@ from .hemicube import Hemicube
 from .light.environment import Environment
 from .light.layers import part_of
 from .light.light import PatchLight
-from .supports import BELL, BOX, LEANING, LINEAR
+from .supports import BELL, BOX, LEANING, LINEAR, Support
 
 # The place of each face in the unfolded hemicube, in faces from its left and top. Faces are seen
 # from inside. The back is in the middle, as the camera of an upright hemicube sees it.
@@ -80,6 +80,36 @@ def parts_at(field: Field, light: PatchLight, x: int, y: int) -> list[Contributi
     FieldError
         The pixel was not captured.
     """
+    found = []
+    for k, support, reflects, parameters in entries_at(field, x, y):
+        average = support.average(light, k, parameters[None])[0]
+        place = _box_of(support.name, parameters)
+        given = (reflects * np.maximum(average, 0)).astype(np.float32)
+        found.append(Contribution(k, support.name, reflects, given, place))
+    return sorted(found, key=lambda part: -float(part.light.sum()))
+
+
+def entries_at(
+    field: Field, x: int, y: int
+) -> list[tuple[int, Support, NDArray[np.float32], NDArray[np.float32]]]:
+    """Find the entries of a pixel: what it reflects of which patches.
+
+    Parameters
+    ----------
+    field : Field
+    x, y : int
+        The pixel, from the left and from the top.
+
+    Returns
+    -------
+    list of (int, Support, (3,) float32, (p,) float32)
+        Of each entry the patch, the support model, R, and the model's parameters.
+
+    Raises
+    ------
+    FieldError
+        The pixel was not captured.
+    """
     for tile in field.tiles:
         r = tile.region
         if r.x <= x < r.x + r.width and r.y <= y < r.y + r.height:
@@ -100,11 +130,8 @@ def parts_at(field: Field, light: PatchLight, x: int, y: int) -> list[Contributi
             at = slice(model.at(block, k).start + i, model.at(block, k).start + i + 1)
             reflects = model.shares(at)[:, 0] * ones
             parameters = model.parameters_of(at)
-            average = model.support.average(light, k, parameters)[0]
-            place = _box_of(model.support.name, parameters[0])
-            given = (reflects * np.maximum(average, 0)).astype(np.float32)
-            found.append(Contribution(k, model.support.name, reflects, given, place))
-    return sorted(found, key=lambda part: -float(part.light.sum()))
+            found.append((k, model.support, reflects, parameters[0]))
+    return found
 
 
 def _box_of(support: str, parameters: NDArray) -> tuple[float, float, float, float] | None:

@@ -37,6 +37,8 @@ def put(socket: Socket, value: float, part: int | None = None) -> None:
 
 
 def _origin(socket: Socket) -> Socket:
+    if not socket.is_linked:
+        return socket
     found, _ = origin(socket)
     if found is None or (
         found.is_output and found.node.bl_idname not in {"ShaderNodeValue", "ShaderNodeRGB"}

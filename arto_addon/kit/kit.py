@@ -262,6 +262,18 @@ def _write_light(node: bpy.types.Node, light: Light, image: bpy.types.Image | No
         _let_go(before)
     if node.label != light.name:
         node.label = light.name
+    set_light(node, light)
+    for name, value in ((ON, light.on), (SOLO, light.solo), (LOCK, light.lock)):
+        if bool(node.get(name, name == ON)) != value:
+            node[name] = value
+    if light.kind is Kind.PICTURE:
+        texture = groups.picture_node(node.node_tree)
+        if texture.image != image:
+            texture.image = image
+
+
+def set_light(node: bpy.types.Node, light: Light) -> None:
+    """Set the inputs of a light's group node."""
     for one in groups.INPUTS:
         if not one.value:
             continue
@@ -272,13 +284,6 @@ def _write_light(node: bpy.types.Node, light: Light, image: bpy.types.Image | No
                 put(socket, value[i], i)
         else:
             put(socket, math.radians(value) if one.subtype == "ANGLE" else value)
-    for name, value in ((ON, light.on), (SOLO, light.solo), (LOCK, light.lock)):
-        if bool(node.get(name, name == ON)) != value:
-            node[name] = value
-    if light.kind is Kind.PICTURE:
-        texture = groups.picture_node(node.node_tree)
-        if texture.image != image:
-            texture.image = image
 
 
 def _backdrop(

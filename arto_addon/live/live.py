@@ -40,6 +40,7 @@ from ..world.own import gains_of
 from . import maps
 from .image import push, put_away, seen, show_plate, view_of
 from .line import FINISHED_LINE, lacking, line
+from .quick import Quick
 from .viewer import Viewer, Wish
 from .wished import Light, Wished
 
@@ -72,7 +73,7 @@ class Live:
         self.written = (self.folder / "field.json").stat().st_mtime_ns
         fields = [take.field for take in shown.takes]
         self.viewer = Viewer(Preview(fields, holds_out(scene, self.layer)))
-        self.maps = maps.Maps()
+        self.maps, self.quick = maps.Maps(), Quick()
         self.shape = shown.field.shape
         # outside this render region a picture is empty
         self.region = shown.field.region
@@ -203,6 +204,10 @@ class Live:
         world = world_of(scene, self.layer)
         full = self.maps.get(key, True)
         image = full if full is not None else self.maps.get(key, False)
+        if image is None and world:
+            image = self.quick.map_of(world)
+            if image is not None:
+                self.maps.keep(key, image)
         self.problem = ""
         try:
             if world and not self.maps.busy:

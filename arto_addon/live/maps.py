@@ -115,6 +115,17 @@ class Maps:
                 self._found.move_to_end((key, full))
             return found
 
+    def keep(self, key: str, image: NDArray[np.float32]) -> None:
+        """Keep a rough map that was made without the second Blender."""
+        with self._lock:
+            self._add((key, False), image)
+
+    def _add(self, of: tuple[str, bool], image: NDArray[np.float32]) -> None:
+        self._found[of] = image
+        self.newest = of[0], image
+        while len(self._found) > MOST:
+            self._found.popitem(last=False)
+
     def trouble_with(self, key: str) -> str:
         """Why a map of this world could not be made; empty where none has failed."""
         with self._lock:
@@ -224,10 +235,7 @@ class Maps:
             if found is None:
                 self._failed[asked] = error
                 return
-            self._found[asked] = found
-            self.newest = asked[0], found
-            while len(self._found) > MOST:
-                self._found.popitem(last=False)
+            self._add(asked, found)
 
     def close(self, wait: bool = True) -> None:
         """End the second Blender and remove the temporary files.

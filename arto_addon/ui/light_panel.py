@@ -18,6 +18,7 @@ from ..shot import status
 from ..world import controls, dials
 from ..world.check import world_of
 from . import thumbnails
+from .kit_panel import draw_kit
 from .places import Draws, say, sentence, slot
 from .result_panel import header_of
 
@@ -34,11 +35,13 @@ class LightPanel(Draws):
         if world is None:
             say(column, context, "The scene has no world", "ERROR")
             column.operator("arto.open_hdri", icon="FILE_FOLDER")
+            draw_kit(column, context, None)
             if live.trouble:
                 say(column, context, sentence(live.trouble), "ERROR")
             return
         _world(column, context, world)
         _live(column, context)
+        draw_kit(column, context, world)
         _own(column, context)
         _layers(column, context)
         _looks(column, context)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from . import more_panels as more
+from .kit_panel import ARTO_UL_kit
 from .light_panel import ARTO_UL_looks, LightPanel
 from .places import panels
 from .result_panel import Result
 from .shot_panel import Quality, ShotPanel
 
 CLASSES = (
+    ARTO_UL_kit,
     ARTO_UL_looks,
     *panels("main", more.Main, sidebar=False),
     *panels("shot", ShotPanel),

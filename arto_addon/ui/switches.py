@@ -12,6 +12,7 @@ from bpy.props import (
     BoolProperty,
     FloatProperty,
     FloatVectorProperty,
+    IntProperty,
     PointerProperty,
     StringProperty,
 )
@@ -121,6 +122,12 @@ class ArtoWorld(bpy.types.PropertyGroup):
         soft_max=1.0,
         get=_get_tint,
         set=_set_tint,
+    )
+
+    kit_light: IntProperty(
+        name="Light of the Kit",
+        description="The light that is chosen in the list",
+        options={"HIDDEN"},
     )
 
 

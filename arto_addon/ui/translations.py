@@ -151,6 +151,50 @@ Your render shows the sequencer; the relit picture shows the scene | Dein Render
 cancelled: parts that were finished are kept | abgebrochen: fertige Teile bleiben | 中止: 完了した部分は残ります
 cancelled: nothing was changed | abgebrochen: nichts wurde geändert | 中止: 変更はありません
 This takes the place of a capture of {more} samples, by {fewer}: it is lost then | Dies ersetzt eine Aufnahme von {more} Samples durch {fewer}: sie ist dann verloren | {more} サンプルのキャプチャを {fewer} で置き換えます: 元には戻せません
+Add Light | Licht hinzufügen | ライトを追加
+Add Picture | Bild hinzufügen | 画像を追加
+Remove Light | Licht entfernen | ライトを削除
+Duplicate Light | Licht verdoppeln | ライトを複製
+Move Light | Licht verschieben | ライトを移動
+Switch Light | Licht schalten | ライトを切り替え
+Kind | Art | 種類
+Blend | Mischung | ブレンド
+Preset | Vorlage | プリセット
+Base | Grund | ベース
+Backdrop | Hintergrund | 背景
+No Backdrop of Its Own | Kein eigener Hintergrund | 専用の背景なし
+Suns and Lamps to Lights | Sonnen und Lampen als Lichter | 太陽とランプをライトに
+Save Kit | Lichtsatz speichern | ライトキットを保存
+Load Kit | Lichtsatz laden | ライトキットを読み込む
+Light to HDRI | Licht als HDRI | 光をHDRIに
+Lights to Lamps | Lichter als Lampen | ライトをランプに
+Put It There | Dorthin setzen | そこに置く
+Load | Laden | 読み込み
+Save | Speichern | 保存
+HDRI | HDRI | HDRI
+Lamps | Lampen | ランプ
+Size | Größe | サイズ
+Blur | Unschärfe | ぼかし
+by nodes | durch Knoten | ノードによる
+Reflect | Spiegeln | 反射
+Rim | Kante | リム
+Shade | Abschatten | 遮る
+Drag: move   Wheel: size   Shift: turn   Ctrl: strength   Enter: keep   ESC, right click: back | Ziehen: bewegen   Rad: Größe   Umschalt: drehen   Strg: Stärke   Enter: behalten   ESC, Rechtsklick: zurück | ドラッグ: 移動   ホイール: サイズ   Shift: 回転   Ctrl: 強さ   Enter: 確定   ESC・右クリック: 元に戻す
+Other nodes stand around the light kit: turn them and the kit there | Um den Lichtsatz stehen andere Knoten: dort drehen | ライトキットの周りに他のノードがあります: そこで回してください
+The world mixes shaders, which cannot stand behind a light kit: mix their colours before one Background, or make a new world | Die Welt mischt Shader, die nicht hinter einem Lichtsatz stehen können: ihre Farben vor einem Background mischen, oder eine neue Welt anlegen | ワールドがシェーダーを混ぜています: 1つの Background の前で色を混ぜるか、新しいワールドを作ってください
+Amount | Anteil | 量
+Stops | Blenden | 段
+Color | Farbe | カラー
+Kelvin | Kelvin | ケルビン
+Azimuth | Azimut | 方位
+Elevation | Höhe | 仰角
+Roll | Rollen | ロール
+Width | Breite | 幅
+Height | Höhe (Größe) | 高さ
+Softness | Weichheit | 柔らかさ
+Gradient | Verlauf | グラデーション
+Slope | Gefälle | 傾斜
+Hole | Loch | 穴
 {plate}, of an earlier capture | {plate}, von früherer Aufnahme | {plate}、以前のキャプチャ
 """
 

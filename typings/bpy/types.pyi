@@ -18,6 +18,7 @@ class _Dials:
     rotation: float
     strength: float
     tint: Any
+    kit_light: int
 
 class World(_Block):
     arto: _Dials

@@ -1,0 +1,1 @@
+"""Where to put a light so that it shines in a pixel."""
