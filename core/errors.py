@@ -42,6 +42,10 @@ class EnvironmentMapError(ArtoError):
     """An image that cannot be used as an environment map."""
 
 
+class TargetError(ArtoError):
+    """A picture that no light can be looked for: of another shape, empty, or masked out."""
+
+
 class SceneError(ArtoError):
     """A Blender scene that cannot be captured or relit as it stands."""
 

@@ -42,27 +42,56 @@ class PatchLight:
     environment : Environment
     hemicube : Hemicube
         Light from directions in which it has no patch is left out.
-    resolution : int, optional
-        Bins a side, the same for all patches. By default a bin is about one texel of the map.
+    resolution : int or (K,) int, optional
+        Bins a side, of all patches or of each. By default a bin is about one texel of the map.
     """
 
     def __init__(
-        self, environment: Environment, hemicube: Hemicube, resolution: int | None = None
+        self,
+        environment: Environment,
+        hemicube: Hemicube,
+        resolution: int | NDArray[np.intp] | None = None,
     ) -> None:
-        self.hemicube = hemicube
         if resolution is None:
-            self.resolutions = default_resolution(hemicube, environment)
-        else:
-            self.resolutions = np.full(len(hemicube), resolution, np.intp)
-        # where the bins of each patch begin, and where its table of sums, one row and column larger
-        self._offsets = _starts(self.resolutions**2)
-        self._tables = _starts((self.resolutions + 1) ** 2)
+            resolution = default_resolution(hemicube, environment)
+        self._begin(hemicube, resolution)
         height, width = environment.image.shape[:2]
         # flux and solid angle stand side by side, so that one look-up fetches all four
         self._flat = np.zeros((int(self._offsets[-1]), 4))
         for some in sample_bins(hemicube, height, width, self.resolutions, self._offsets):
             self._collect(environment.image[some.rows], some, environment.turn)
         self._fill_empty(environment)
+
+    @staticmethod
+    def of_bins(
+        hemicube: Hemicube, resolutions: NDArray[np.intp], bins: NDArray[np.float64]
+    ) -> PatchLight:
+        """Make a light of bins that are known already.
+
+        Parameters
+        ----------
+        hemicube : Hemicube
+        resolutions : (K,) int
+            Bins a side of each patch.
+        bins : (n, 4) float64
+            Flux of red, green and blue, and solid angle: patch by patch, row by row of v. No solid
+            angle is 0.
+
+        Returns
+        -------
+        PatchLight
+        """
+        out = PatchLight.__new__(PatchLight)
+        out._begin(hemicube, resolutions)
+        out._flat = bins
+        return out
+
+    def _begin(self, hemicube: Hemicube, resolution: int | NDArray[np.intp]) -> None:
+        self.hemicube = hemicube
+        self.resolutions = np.full(len(hemicube), resolution, np.intp)
+        # where the bins of each patch begin, and where its table of sums, one row and column larger
+        self._offsets = _starts(self.resolutions**2)
+        self._tables = _starts((self.resolutions + 1) ** 2)
         self._lock = Lock()
         self._polynomials: dict[tuple[int, ...], NDArray[np.float64]] = {}
         self._sums: NDArray[np.float64] | None = None

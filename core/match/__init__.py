@@ -1,0 +1,1 @@
+"""The light that makes a shot look like a picture."""
