@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from . import heavy_command, mirrors_command, place_command
+from . import heavy_command, match_command, mirrors_command, place_command
 
 
 def _demo(options: argparse.Namespace) -> None:
@@ -223,15 +223,6 @@ def _live(options: argparse.Namespace) -> None:
     live_bench(options.sizes, options.samples, options.json)
 
 
-def _match(options: argparse.Namespace) -> None:
-    from . import worlds
-    from .match import SCENES, match, table
-
-    size = (options.width, options.width * 3 // 4)
-    hdris = options.worlds or worlds.hdri_names()
-    print(table(match(options.json, options.scenes or SCENES, hdris, size, options.samples)))
-
-
 def _plates(options: argparse.Namespace) -> None:
     from . import specks
     from .plates import plates, table
@@ -378,13 +369,7 @@ def main() -> int:
     c.add_argument("--page", type=Path, help="a table in Markdown, to write")
     c.set_defaults(run=_plates)
 
-    c = commands.add_parser("match", help="a hidden HDRI's look, found from its picture")
-    c.add_argument("--json", type=Path, default=Path("out/match.json"))
-    c.add_argument("--scenes", nargs="+")
-    c.add_argument("--worlds", nargs="+")
-    c.add_argument("--width", type=int, default=240)
-    c.add_argument("--samples", type=int, default=64)
-    c.set_defaults(run=_match)
+    match_command.add(commands)
 
     c = commands.add_parser("live", help="updates a second while the light is changed")
     c.add_argument("--json", type=Path, default=Path("out/live.json"))

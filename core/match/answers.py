@@ -20,8 +20,7 @@ from ..field.tile import Tile
 from ..light.environment import Environment
 from ..light.light import PatchLight
 from ..preview import Preview
-from ..supports import BELL, BOX
-from .cells import Cells, cells_for
+from .cells import MOST, NARROW, Cells, cells_for
 from .target import smaller
 
 # The most pixels of the small proxy, and of the finer one.
@@ -60,12 +59,14 @@ class Answers:
     alpha: NDArray[np.float64]
 
     @staticmethod
-    def of(preview: Preview) -> Answers:
+    def of(preview: Preview, most: int = MOST) -> Answers:
         """Compute the matrix of a shot. Of a shot with shadow catchers it is that of everything.
 
         Parameters
         ----------
         preview : Preview
+        most : int
+            The most cells.
 
         Returns
         -------
@@ -87,7 +88,7 @@ class Answers:
             if len(found) > FINE_PIXELS:
                 break
             fine, finer, shiny = field, other, found
-        cells = cells_for(fine)
+        cells = cells_for(fine, most)
         values = answers(small, cells)
         alpha = small.layer("alpha").ravel()
         if len(shiny):
@@ -259,7 +260,7 @@ def _shares_of_narrow(field: Field) -> NDArray[np.float64]:
                     met = mine[model.pixels(block, k)]
                     light = model.codes[1, model.at(block, k)].astype(np.float64) ** 2
                     every[met] += light
-                    if model.support.code in (BOX.code, BELL.code):
+                    if model.support.code in NARROW:
                         narrow[met] += light
     return np.divide(narrow, every, out=narrow, where=every > 0)
 

@@ -27,7 +27,10 @@ from ..hemicube import Hemicube
 from ..light.bins import bin_coordinate
 from ..light.environment import Environment, directions, sample_directions
 from ..light.light import PatchLight
-from ..supports import BELL, BOX
+from ..supports import BELL, BOX, LEANING
+
+# The models that see a part of a patch.
+NARROW = (BOX.code, BELL.code, LEANING.code)
 
 # The most cells a side of a patch, and the bins a side of a cell.
 MOST_SIDES, BINS = 8, 2
@@ -255,7 +258,7 @@ def cells_for(field: Field, most: int = MOST) -> Cells:
     for tile in field.tiles:
         tile.open()
         for model in tile.models:
-            if model.support.code in (BOX.code, BELL.code):
+            if model.support.code in NARROW:
                 for block in range(len(tile.blocks)):
                     _count_looks(model, block, levels, looks)
     wide = np.sqrt(hemicube.solid_angles) > WIDE
@@ -278,7 +281,7 @@ def _count_looks(model: Model, block: int, levels: list[int], looks: NDArray[np.
     for k in np.flatnonzero(model.counts[block]).tolist():
         at = model.at(block, k)
         given = model.parameters_of(at)
-        if model.support.code == BELL.code:
+        if model.support.code != BOX.code:
             size = 2 * np.sqrt(np.maximum(given[:, 1] * given[:, 3], 0))
         else:
             size = np.sqrt(np.maximum((given[:, 1] - given[:, 0]) * (given[:, 3] - given[:, 2]), 0))

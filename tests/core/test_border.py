@@ -95,7 +95,7 @@ FLOW = {
     "core": """errors < units < memory < regular < checksum < before < marked < files < arrays
     < signed < region < file_names < description < values < shot < metrics < patterns < measure
     < faces < partition < hemicube < exr < cryptomatte < capture < light < kit < supports < field
-    < fit < lights < relight < catcher < preview < inside < place < verify""",
+    < fit < lights < relight < catcher < preview < inside < place < match < verify""",
     "arto_addon": """interrupt < work < settings < blender < stage < shot < kit < world < plate
     < fit < capture < relight < shoot < job < live < farm < ui""",
 }
