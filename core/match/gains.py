@@ -105,9 +105,9 @@ def solved(
         (i, c) for i in range(len(pictures)) for c in (range(3) if by_colour[i] else (None,))
     ]
     basis = np.zeros((len(columns), *wanted.shape))
-    for row, (i, c) in zip(basis, columns, strict=True):
+    for a, (i, c) in enumerate(columns):
         chosen = slice(None) if c is None else c
-        row[:, chosen] = pictures[i][:, chosen]
+        basis[a, :, chosen] = pictures[i][:, chosen]
     pull = pull_of(wish.near)
     goal = np.array([hold[i].mean() if c is None else hold[i, c] for i, c in columns])
     error = 0.0
