@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
@@ -10,7 +11,7 @@ from pathlib import Path
 
 import bpy
 
-from ...core import exr
+from ...core import exr, marked
 from ...core.capture import head as heads
 from ...core.capture.head import CaptureHead
 from ...core.capture.kinds import Route, Take
@@ -27,7 +28,7 @@ from ..stage.stage import Stage, set_region
 from ..work import Progress, Render, Steps, Warned, Wrote
 from . import beside, planes
 from .asked import Asked, asked, begun
-from .check import check_patterns, check_scene
+from .check import check_patterns, check_room_of, check_scene
 from .plan import render_plan
 from .planned import Given, Planned
 from .resume import empty, empty_take, finish, finish_field, let_go, unfinished
@@ -98,6 +99,7 @@ def _claimed(
     # let the scene follow what a script has moved
     scene.view_layers[view_layer].update()
     check_patterns(scene)
+    check_room_of(paths.place(scene, view_layer).folder)
     claimed = paths.claim(scene, view_layer, together)
     with Lock(claimed, f"capturing {shot_of(scene, view_layer).title}") as held:
         yield claimed, held.left
@@ -113,6 +115,8 @@ def _capture(
     with asked(scene, view_layer, given) as this:
         folder = paths.unfinished_folder(claimed, this.key)
         head = unfinished(folder, this.key)
+        if head is None and os.path.lexists(folder):
+            marked.check(folder, "capture", claimed)  # it is emptied once all is planned
         if of_sequence and head is None and beside.is_whole(claimed, this.key, this.catchers):
             yield Wrote(1.0, "it is there already", claimed / "capture")
             return claimed / "capture"

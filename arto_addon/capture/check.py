@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 import bpy
 
+from ...core import marked
 from ...core.capture.kinds import Keep
 from ...core.errors import BusyError, SceneError
-from ...core.files import Lock, is_writable
+from ...core.file_names import is_text
+from ...core.files import OLD, Lock, is_writable
 from ...core.fit.choice import check as check_choice
 from ..blender.markers import camera_of
 from ..shot import paths
+from ..shot.home import check_outside
 from ..shot.shot import layer_of
 from ..stage.stage import picture_size
+from ..stage.takes import TAKES
 from ..world.check import check_light_of, world_of
 from .drawn import check_drawn
 from .patterns import patterns_of
@@ -42,6 +49,26 @@ def check_place(scene: bpy.types.Scene, view_layer: str) -> None:
             f"nothing can be written into {folder}: see who may write there, or choose another "
             "folder in ARTO's settings"
         )
+    check_room_of(folder)
+
+
+def check_room_of(folder: Path) -> None:
+    """Look at where a shot's capture sets and fields will be put.
+
+    Raises SceneError where they would lie in a folder of ARTO's that is removed as a whole, or have
+    a name that is no text; FilesError where a folder of others has the name of one of them.
+    """
+    if not is_text(folder):
+        raise SceneError(
+            f"the path {str(folder)!a} is not written in UTF-8, so nothing can be rendered there: "
+            "rename its folder, or choose another in ARTO's settings"
+        )
+    check_outside(folder.parent, "captures")
+    for take in ("", *TAKES):
+        for name in ("capture", "field"):
+            for there in (folder / take / name, folder / take / (name + OLD)):
+                if os.path.lexists(there):
+                    marked.check(there, None, folder)
 
 
 def check_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> None:

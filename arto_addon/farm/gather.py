@@ -9,24 +9,24 @@ from pathlib import Path
 
 import bpy
 
-from ...core import marked
+from ...core import exr, marked
 from ...core.capture import head as heads
 from ...core.capture.capture_set import CaptureSet
 from ...core.capture.head import CaptureHead
 from ...core.capture.kinds import Take
-from ...core.capture.tile_entry import SeedEntry, fitted_name, sums_of
-from ...core.errors import ArtoError, FarmError, FieldError
+from ...core.capture.tile_entry import SeedEntry, TileEntry, fitted_name, sums_of
+from ...core.errors import ArtoError, FarmError
 from ...core.field.field import proxy_folder
 from ...core.field.proxy import FACTORS
-from ...core.field.tile import SUFFIX, checksum_of
-from ...core.field.tile_file import TileFile
-from ...core.files import PART, Lock, moved
+from ...core.files import PART, Lock, moved, replace_folder
+from ...core.fit.fit import fit as fit_captured
 from ...core.fit.fit import fit_into
 from ..capture import room
 from ..capture.capture import check_file, plan_of
 from ..capture.check import check_place
 from ..capture.resume import empty_take, finish, finish_field, let_go
 from ..capture.stream import Stream
+from ..fit.fit import is_fitted
 from ..fit.guides import cleaned
 from ..shot import paths, scene_id
 from ..shot.shot import shot_of
@@ -92,6 +92,7 @@ def _looked_at(job: Job, frame: int) -> _Frame:
         for take in job.takes(frame)
         if not _gathered(job, frame, take)
     }
+    sets = {take: _without_damaged(captured, job) for take, captured in sets.items()}
     wanted = [part for part in job.parts if part.frame == frame and part.take in sets]
     found = {part: _found(job, part, sets[part.take]) for part in wanted}
     if missing := [part for part, there in found.items() if there is None]:
@@ -124,6 +125,8 @@ def _gather(job: Job, scene: bpy.types.Scene, view_layer: str, there: _Frame) ->
         for take in there.sets:
             parts = {part: found for part, found in there.parts.items() if part.take == take}
             yield from _joined(job, frame, take, parts)
+        for take in there.sets:
+            yield from _fitted(scene, job.set_folder(frame, take))
         # put all takes in place at the end, the first take last, as `capture` does
         for take in reversed(list(there.sets)):
             yield from _placed(scene, job.set_folder(frame, take), claimed / take)
@@ -166,38 +169,54 @@ def _found(job: Job, part: Part, captured: CaptureSet) -> Found | None:
     """
     if captured.head.tiles[part.tile].done:
         return Found(None)
+    again = f"render part {part.number} again"
     if told := job.there(part, captured.head.key):
-        if told.fitted:
-            _check_fitted(job.part_folder(part) / Stream.FIELD, told.fitted, part)
+        if wrong := job.damage(part, told):
+            raise FarmError(f"{wrong}: {again}")
         return Found(job.part_folder(part), told.files, told.samples, told.fitted, told.sums)
     files = []
     for i, images in enumerate(plan_of(captured.head)):
-        rendered = sorted((job.folder / "parts").glob(f"{part.name}_{i:02d}_*.exr"))
-        if not rendered:
+        rendered = job.folder / "parts" / part.rendered_name(i)
+        if not rendered.exists():
             return None
         try:
-            check_file(rendered[-1], images)
+            check_file(rendered, images)
+            said = str(exr.header(rendered).get("Note", ""))
         except ArtoError as e:
-            raise FarmError(f"{e}: render part {part.number} again") from e
-        files.append(rendered[-1].name)
+            raise FarmError(f"{e}: {again}") from e
+        if said != part.note(i, captured.head.key):
+            raise FarmError(
+                f"{rendered} is not of this part (its header says '{said}'): save the part's "
+                f".blend anew, and {again}"
+            )
+        files.append(rendered.name)
     parts = job.folder / "parts"
     samples = job.samples_of(captured.head)
     return Found(parts, tuple(files), samples, sums=sums_of(parts, files))
 
 
-def _check_fitted(field: Path, fitted: Mapping[str, object], part: Part) -> None:
-    """Raise FarmError where a fitted tile, which is to replace another, is not what was written."""
-    path = field / str(fitted_name(fitted))
-    if path.suffix != SUFFIX or not path.exists():
-        return  # of the version before, or moved by an earlier gathering
+def _without_damaged(captured: CaptureSet, job: Job) -> CaptureSet:
+    """Take back the tiles of a set whose images were moved there and were damaged since.
+
+    Their parts count as missing then, until they are rendered again.
+    """
+    head = captured.head
+    for number, tile in enumerate(head.tiles):
+        if tile.done and tile.fitted is None and _is_damaged(captured.folder, tile):
+            samples = job.samples_of(head)
+            head = head.with_tile(number, files=(), seeds=(), sums={}, done=False)
+            if not head.done:
+                head = replace(head, samples=samples)
+    if head is not captured.head:
+        heads.write(captured.folder, head)
+    return CaptureSet(captured.folder, unfinished=True)
+
+
+def _is_damaged(folder: Path, tile: TileEntry) -> bool:
     try:
-        tile = TileFile(path)
-        tile.check()
-        found = checksum_of(tile.index.values())
-        if fitted.get("checksum", found) != found:
-            raise FieldError(f"{path} is another part's")
-    except FieldError as e:
-        raise FarmError(f"{e} (render part {part.number} again)") from e
+        return sums_of(folder, tile.sums) != tile.sums
+    except ArtoError:
+        return True
 
 
 def _joined(job: Job, frame: int, take: Take, parts: dict[Part, Found]) -> Steps[None]:
@@ -233,7 +252,7 @@ def _taken(
         if told.folder is None:
             raise FarmError(f"{part.name} was gathered, but {folder} does not say so: plan again")
         for i, name in enumerate(told.files):
-            names.append(f"tile_{part.tile:04d}_seed_{part.seed:02d}_{i:04d}.exr")
+            names.append(part.file_name(i))
             if (told.folder / name).exists():  # otherwise an earlier gathering moved it
                 moved(told.folder / name, folder / names[-1])
             if name in told.sums:
@@ -275,6 +294,21 @@ def _fit(captured: CaptureSet, tile: int, tiles: int) -> Steps[dict]:
     )
 
 
+def _fitted(scene: bpy.types.Scene, folder: Path) -> Steps[None]:
+    """Give a set the scene's ID, and fit the images that it keeps, before it takes its place."""
+    captured = CaptureSet(folder)
+    # a job planned before the scene had an ID has none, and names may change: add the ID now
+    if captured.head.shot:
+        shot = replace(captured.head.shot, scene_id=scene_id.of(scene))
+        heads.write(folder, replace(captured.head, shot=shot))
+        captured = CaptureSet(folder)
+    choice, separate = scene.arto.support, scene.arto.separate
+    field = folder / Stream.FIELD
+    if captured.kept and not is_fitted(captured, field, choice, separate):
+        for share, text in fit_captured(captured, field, choice, separate):
+            yield Progress(share, text)
+
+
 def _placed(scene: bpy.types.Scene, folder: Path, place: Path) -> Steps[None]:
     """Replace the shot's last capture set and field by the complete new set and its field."""
     try:
@@ -289,13 +323,12 @@ def _placed(scene: bpy.types.Scene, folder: Path, place: Path) -> Steps[None]:
     except OSError as e:
         raise FarmError(f"{place} cannot be written ({e}): make room, and gather again") from e
     head = CaptureSet(near).head
-    # a job planned before the scene had an ID has none, and names may change: add the ID now
-    if head.shot:
-        head = replace(head, shot=replace(head.shot, scene_id=scene_id.of(scene)))
-    heads.write(near, head)
-    if not head.kept:
+    if head.kept:
+        if (near / Stream.FIELD).exists():  # else a gathering that was stopped has put it there
+            replace_folder(near / Stream.FIELD, place / "field")
+    else:
         finish_field(near, place / "field", head)
-        yield from cleaned(scene, place / "field")
+    yield from cleaned(scene, place / "field")
     finish(near, place / "capture")
     if near != folder:
         marked.remove(folder, "capture", folder.parent)

@@ -51,6 +51,23 @@ class Part:
     def name(self) -> str:
         return f"part_{self.number:04d}"
 
+    def file_name(self, render: int) -> str:
+        """The name of a render of this part among the files of its capture set."""
+        return f"tile_{self.tile:04d}_seed_{self.seed:02d}_{render:04d}.exr"
+
+    def rendered_name(self, render: int) -> str:
+        """The name of a render that a Blender without ARTO makes, as Blender numbers frames."""
+        sign = "-" if self.frame < 0 else ""
+        return f"{self.name}_{render:02d}_{sign}{abs(self.frame):04d}.exr"
+
+    def note(self, render: int, key: str | None) -> str:
+        """What such a render says of itself in its header. key: of the capture that it is of."""
+        take = f", take {self.take}" if self.take else ""
+        return (
+            f"ARTO part of {key}: frame {self.frame}{take}, tile {self.tile}, seed {self.seed}, "
+            f"render {render}"
+        )
+
     @staticmethod
     def read(said: Values) -> Part:
         """Read a part from the values of a `part.json`. Raises FarmError."""

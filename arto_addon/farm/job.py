@@ -13,16 +13,22 @@ from pathlib import Path
 
 import bpy
 
+from ...core import checksum
 from ...core.capture.capture_set import CaptureSet
 from ...core.capture.head import CaptureHead
 from ...core.capture.kinds import Quality, Take
-from ...core.errors import FarmError
+from ...core.capture.tile_entry import fitted_name
+from ...core.errors import FarmError, FieldError
+from ...core.field.tile import SUFFIX, checksum_of
+from ...core.field.tile_file import TileFile
+from ...core.file_names import is_text
 from ..blender import scripts
 from ..blender.front import to_front
 from ..capture import room
 from ..capture.capture import plan_of
 from ..capture.room import Estimate
 from ..capture.sequence import frame_kept
+from ..capture.stream import Stream
 from ..settings.table import FARM
 from ..shot import home
 from ..stage.settings import samples_told
@@ -35,6 +41,11 @@ class Job:
     """A farm's job, opened. Raises FarmError where it is missing or damaged."""
 
     def __init__(self, folder: Path) -> None:
+        if not is_text(folder):
+            raise FarmError(
+                f"the path {str(folder)!a} is not written in UTF-8, so nothing can be rendered "
+                "there: rename its folder, or plan into another"
+            )
         self.folder, self.head = folder, heads.read(folder)
         # the frames that show shadow catchers
         self.catchers = frozenset(self.head.catchers)
@@ -70,6 +81,10 @@ class Job:
         tiles = self.head.tiles
         if len(found.head.tiles) != tiles:
             raise FarmError(f"{found.folder} has not the job's {tiles} tiles: plan again")
+        if found.head.shot and found.head.shot.frame != frame:
+            raise FarmError(
+                f"{found.folder} is of frame {found.head.shot.frame}: put it back, or plan again"
+            )
         if (found.head.take or WHOLE) != take:
             raise FarmError(f"{found.folder} is not of the take '{take}': plan again")
         return found
@@ -110,6 +125,40 @@ class Job:
                 "render that part again"
             )
         return said
+
+    def damage(self, part: Part, told: PartHead) -> str:
+        """Say what is missing or damaged of a part that was rendered, in words; "" for nothing.
+
+        Its files are compared with their checksums, where it has some. A gathering that was
+        stopped may have moved some of them already.
+        """
+        for i, name in enumerate(told.files):
+            path = self.part_folder(part) / name
+            if not path.exists():
+                path = self.set_folder(part.frame, part.take) / part.file_name(i)
+            try:
+                if name in told.sums and checksum.of_file(path) != told.sums[name]:
+                    return f"{path} is not what was rendered"
+                if not path.is_file():
+                    return f"{path} is not there"
+            except OSError as e:
+                return f"{path} cannot be read ({e})"
+        if told.fitted is not None:
+            return self._damage_fitted(part, told.fitted)
+        return ""
+
+    def _damage_fitted(self, part: Part, fitted: Mapping[str, object]) -> str:
+        """Say why a fitted tile is not what was written; it is to replace another."""
+        path = self.part_folder(part) / Stream.FIELD / str(fitted_name(fitted))
+        if path.suffix != SUFFIX or not path.exists():
+            return ""  # of the version before, or moved by an earlier gathering
+        try:
+            tile = TileFile(path)
+            tile.check()
+            found = checksum_of(tile.index.values())
+        except FieldError as e:
+            return str(e)
+        return "" if fitted.get("checksum", found) == found else f"{path} is another part's"
 
     @contextmanager
     def scene(self) -> Iterator[tuple[bpy.types.Scene, str]]:

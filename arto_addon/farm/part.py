@@ -42,9 +42,12 @@ def render_part(job_folder: Path, number: int) -> Steps[Path]:
     part = job.part(number)
     captured = job.set_of(part.frame, part.take)
     folder = job.part_folder(part)
-    if job.there(part, captured.head.key):
-        yield Wrote(1.0, f"{part.name} is there", folder)
-        return folder
+    if told := job.there(part, captured.head.key):
+        wrong = job.damage(part, told)
+        if not wrong:
+            yield Wrote(1.0, f"{part.name} is there", folder)
+            return folder
+        yield Progress(0.0, f"{wrong}: {part.name} is rendered again")
     fitted = job.head.seeds == 1 and not captured.kept
     needed = estimate(captured.head, fitted)
     room.check_memory(needed.memory, part.name)
@@ -117,6 +120,9 @@ def save_part(job_folder: Path, number: int) -> Steps[Path]:
             path.parent.mkdir(parents=True, exist_ok=True)
             with set_tile(this.on, captured.head, part.tile, images):
                 write_to(this.on.scene.render, Path(f"//{part.name}_{i:02d}_####.exr"))
+                # by which a gathering knows of what the picture is, whatever its name
+                this.on.scene.render.use_stamp_note = True
+                this.on.scene.render.stamp_note_text = part.note(i, captured.head.key)
                 _save_alone(this.on.scene, path)
             saved.append(path)
             yield Wrote((i + 1) / len(plan_of(captured.head)), f"saved {path.name}", path)

@@ -16,6 +16,7 @@ from ...core.capture import head as capture_heads
 from ...core.capture.head import CaptureHead
 from ...core.capture.kinds import Take
 from ...core.errors import CaptureSetError, FarmError
+from ...core.file_names import is_text
 from ...core.files import is_writable
 from ...core.fit.choice import check as check_choice
 from ...core.units import size
@@ -27,6 +28,7 @@ from ..capture.patterns import patterns_of
 from ..capture.planned import Given
 from ..capture.sequence import frame_kept, look, together
 from ..shot import home
+from ..shot.home import check_outside
 from ..stage.takes import TAKES, WHOLE
 from ..work import PLAIN, Progress, Steps, Wrote, looked
 from . import job, templates
@@ -107,7 +109,12 @@ def plan(
 
 
 def _check_place(folder: Path) -> None:
-    """Raise FarmError where nothing can be written into a job's folder."""
+    """Raise FarmError, or SceneError, where nothing can or may be written into a job's folder."""
+    if not is_text(folder):
+        raise FarmError(
+            f"the path {str(folder)!a} is not written in UTF-8: plan into another folder"
+        )
+    check_outside(folder, "a job")
     if not is_writable(folder):
         raise FarmError(
             f"nothing can be written into {folder}: see who may write there, or plan into another "

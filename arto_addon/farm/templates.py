@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
 import shlex
+from collections.abc import Mapping
 from pathlib import Path
 
+from ...core import signed
 from ...core.description import MOST_BYTES
 from ...core.errors import FarmError
 from ...core.files import write_text
 from ...core.regular import read_regular
+from ...core.values import Values
 from ..blender import scripts
 from ..blender.addon import ADDON
 from .job import Job
@@ -19,32 +23,53 @@ from .job import Job
 OPENJD = "openjd.json"
 LINES = "commands.txt"
 FLAMENCO = "arto_capture.js"
+# What says of these files what ARTO wrote.
+WRITTEN, FORMAT = "templates.json", "ARTO templates"
 # Factory settings and this add-on alone: workers have no user preferences.
 QUIET = ["-b", "--factory-startup", "--offline-mode"]
 
 
 def write(job: Job) -> None:
-    """Write these files into the job's folder."""
-    write_text(job.folder / OPENJD, json.dumps(openjd(job), indent=1))
-    write_text(job.folder / LINES, "\n".join(lines(job)) + "\n")
+    """Write these files into the job's folder, and what by one knows that they are as written."""
     script = Path(__file__).with_name(FLAMENCO).read_text(encoding="utf-8")
     if scripts.ALLOWED in _quietly():
         script = script.replace('"--addons"', f'"{scripts.ALLOWED}", "--addons"')
-    write_text(job.folder / FLAMENCO, script)
+    texts = {
+        OPENJD: json.dumps(openjd(job), indent=1),
+        LINES: "\n".join(lines(job)) + "\n",
+        FLAMENCO: script,
+    }
+    said = {name: _digest(text.encode()) for name, text in texts.items()}
+    signed.write(job.folder / WRITTEN, {"format": FORMAT, "files": said})
+    for name, text in texts.items():
+        write_text(job.folder / name, text)
 
 
 def check(folder: Path) -> None:
-    """Raise FarmError where a file that is not ARTO's has the name of a file to be written."""
-    for name, says in ((OPENJD, '"ARTO '), (LINES, "--command arto gather"), (FLAMENCO, "ARTO")):
+    """Raise FarmError where a file that is not just as ARTO wrote it has the name of a template."""
+    said: Mapping[str, object] = {}
+    if os.path.lexists(folder / WRITTEN):
+        values = Values(folder / WRITTEN, FarmError)
+        if values.data.get("format") != FORMAT:
+            raise FarmError(f"{folder / WRITTEN} was not written by ARTO: plan into another folder")
+        said = values.kind("files", dict, {})
+    for name in (OPENJD, LINES, FLAMENCO):
         path = folder / name
         if not os.path.lexists(path):
             continue
         try:
-            ours = says in read_regular(path, MOST_BYTES).decode("utf-8", "replace")
+            ours = said.get(name) == _digest(read_regular(path, MOST_BYTES))
         except OSError:
             ours = False
         if not ours:
-            raise FarmError(f"{path} was not written by ARTO: plan into another folder")
+            raise FarmError(
+                f"{path} was not written by ARTO, or was changed since: move it away, or plan into "
+                "another folder"
+            )
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
 
 
 def openjd(job: Job) -> dict[str, object]:

@@ -18,7 +18,7 @@ from ..stage import takes
 from ..work import Progress, Steps, Wrote
 
 
-def _is_fitted(captured: CaptureSet, folder: Path, choice: str, separate: bool) -> bool:
+def is_fitted(captured: CaptureSet, folder: Path, choice: str, separate: bool) -> bool:
     """Whether the field in a folder is what a fit with these settings would make."""
     try:
         about = Field(folder).about
@@ -56,7 +56,7 @@ def fit(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps[Path]:
     check_same_shot(scene, captured.head.shot, "the capture set", layer)
     settings = scene.arto
     there = place.source / "field"
-    if _is_fitted(captured, there, settings.support, settings.separate):
+    if is_fitted(captured, there, settings.support, settings.separate):
         yield Progress(1.0, "there is nothing to fit: the field is of this capture")
         return there
     if not captured.kept:

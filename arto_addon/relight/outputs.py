@@ -12,6 +12,7 @@ from ..capture import room
 from ..plate import marks, plate
 from ..plate.footage import footage
 from ..plate.marks import ENDINGS
+from ..shot.home import check_outside
 from . import layers
 from .inputs import Inputs, inputs
 from .shown import Shown
@@ -38,6 +39,7 @@ def check_picture(shown: Shown, path: Path, read: Inputs | None = None) -> None:
             f"'{path.name}' and what is added to it for files beside it is {longest} bytes long, "
             f"and disks take {_LONGEST}: shorten the output's name"
         )
+    check_outside(path, "pictures")
     if path.is_dir():
         raise SceneError(f"{path} is a folder: choose another output")
     if not is_writable(path.parent):

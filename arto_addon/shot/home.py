@@ -13,6 +13,7 @@ from typing import TypeVar
 
 import bpy
 
+from ...core import marked
 from ...core.errors import SceneError
 
 _Block = TypeVar("_Block", bound=bpy.types.ID)
@@ -46,6 +47,18 @@ def absolute(path: str, library: bpy.types.Library | None = None) -> Path:
             "ARTO's folder and output to absolute paths"
         )
     return Path(bpy.path.abspath(path, start=str(Path(file()).parent)))
+
+
+def check_outside(path: Path, what: str) -> None:
+    """Raise SceneError where a path lies in a folder that ARTO has made and removes as a whole.
+
+    what: is to be written there, for the message.
+    """
+    if folder := marked.around(path):
+        raise SceneError(
+            f"{path} lies in {folder}, a folder of ARTO's that is removed with all that is in it: "
+            f"choose another place for {what}"
+        )
 
 
 def relative(path: Path) -> str:
