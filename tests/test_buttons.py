@@ -13,14 +13,21 @@ import numpy as np
 import pytest
 from program_tools import Program
 from walk_tools import ARRANGE, TAB, WATCH, Walk
-from window_tools import ended, windows
+from window_tools import Window, ended, windows
 
 
-@pytest.fixture
-def walk(program: Program, made: Path, tmp_path: Path) -> Iterator[Walk]:
-    blend = Path(shutil.copy(made / "scene.blend", tmp_path))
-    with windows(program, tmp_path) as opener:
-        yield Walk(opener, blend, None)
+@pytest.fixture(scope="module")
+def walk(program: Program, made: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Walk]:
+    """A window on a shot that was captured by its button."""
+    folder = tmp_path_factory.mktemp("buttons")
+    blend = Path(shutil.copy(made / "scene.blend", folder))
+    with windows(program, folder) as opener:
+        walk = Walk(opener, blend, None)
+        walk.w.do(ARRANGE)
+        walk.w.wait(TAB)
+        walk.w.do(BEGIN)
+        work(walk.w, "shoot")
+        yield walk
 
 
 BEGIN = """
@@ -48,30 +55,36 @@ with bpy.context.temp_override(window=window, area=area, region=region):
 ROUNDED = 2.5
 
 
+def shown(w: Window, image: str) -> np.ndarray:
+    """An image of the file, as it is on the display."""
+    w.do(SHOW.format(image))
+    return w.seen()
+
+
+def press(w: Window, button: str) -> None:
+    """Call an operator as its button does."""
+    w.do(f"bpy.ops.arto.{button}('INVOKE_DEFAULT')")
+
+
+def work(w: Window, button: str) -> str:
+    """Press a button that starts a job, and wait for the end of the job -> its report."""
+    press(w, button)
+    level, text = w.idle()
+    assert level == "INFO", text
+    return text
+
+
+def agree(w: Window, button: str) -> None:
+    """Press a button that asks first, and say yes."""
+    w.point(700, 400)
+    press(w, button)
+    w.key("Return")
+
+
 def test_what_the_buttons_show(walk: Walk) -> None:
     w = walk.w
-    w.do(ARRANGE)
-    w.wait(TAB)
-    w.do(BEGIN)
-
-    def shown(image: str) -> np.ndarray:
-        w.do(SHOW.format(image))
-        return w.seen()
-
-    def press(button: str) -> None:
-        """Call an operator as its button does."""
-        w.do(f"bpy.ops.arto.{button}('INVOKE_DEFAULT')")
-
-    def work(button: str) -> str:
-        """Press a button that starts a job, and wait for the end of the job -> its report."""
-        press(button)
-        level, text = w.idle()
-        assert level == "INFO", text
-        return text
-
-    work("shoot")
     assert w.seen().shape[0] > 300  # it fills the editor
-    plate = shown("ARTO Relit")
+    plate = shown(w, "ARTO Relit")
     assert plate.std() > 10  # it is a picture
 
     # over a finished plate Live shows the plate, which says so
@@ -101,7 +114,7 @@ def test_what_the_buttons_show(walk: Walk) -> None:
     os.kill(pid, signal.SIGSTOP)  # so small a picture may be finished before all is looked at
     assert w.get("session.current.guest and session.busy() == ''")
     assert [w.point(x, row) or w.get(slider) for row in rows] == edges
-    press("show_plate")
+    press(w, "show_plate")
     assert w.get("session.current is None")
     os.kill(pid, signal.SIGCONT)
     ended(pid)
@@ -114,7 +127,7 @@ def test_what_the_buttons_show(walk: Walk) -> None:
     assert [w.point(x, row) or w.get(slider) for row in rows] == edges
     w.do(press_live.format(False))
 
-    plate = shown("ARTO Relit")
+    plate = shown(w, "ARTO Relit")
 
     # the plate beside the last render, each as Blender shows it alone
     formats = "[getattr(scene.render.image_settings, p.identifier) for p in " \
@@ -125,8 +138,8 @@ def test_what_the_buttons_show(walk: Walk) -> None:
     w.point(700, 400)
     w.key("F12")
     w.wait("ended")
-    render = shown("Render Result")
-    press("compare")
+    render = shown(w, "Render Result")
+    press(w, "compare")
     assert w.get("space_of().image.name") == "ARTO Compare"
     assert w.get(formats) == before
     side = w.seen()
@@ -149,3 +162,95 @@ def test_what_the_buttons_show(walk: Walk) -> None:
     assert w.get("counts") == {}
     # of a core; Blender itself takes up to 2%, and the test's own questions some
     assert (w.seconds - before) / (time.monotonic() - begun) < 0.1
+
+
+TOLD = "told(scene).kind"
+# What the panel says of the shot, once the scene was looked at.
+STATE = """
+told = next(m for n, m in sys.modules.items() if n.endswith(".arto_addon.ui.state")).told
+light = next(m for n, m in sys.modules.items() if n.endswith(".arto_addon.ui.light_panel"))
+scene.arto.live_finish, scene.arto.compare = True, "OFF"
+"""
+
+
+def test_what_the_buttons_do_with_a_shot(walk: Walk) -> None:
+    w = walk.w
+    w.do(STATE)
+    plate = shown(w, "ARTO Relit")
+
+    # Set Back: camera, frame and size
+    w.do(
+        "own = scene.camera; other = bpy.data.objects.new('Other', own.data.copy()); "
+        "scene.collection.objects.link(other); scene.camera = other; scene.frame_set(7); "
+        "scene.render.resolution_x = 80"
+    )
+    w.wait(f"{TOLD} == 'elsewhere'")
+    press(w, "set_back")
+    w.wait(f"{TOLD} == 'ready'")
+    assert w.get("(scene.camera == own, scene.frame_current, scene.render.resolution_x)") == [
+        True, 1, 64,
+    ]  # fmt: skip
+    w.do("bpy.data.objects.remove(other)")
+
+    # Groups: a layer of its own, and the picture as before
+    for _ in range(2):
+        press(w, "add_group")
+    press(w, "remove_group")
+    w.do("scene.arto.layers = 'GROUPS'; scene.arto.groups[0].radius = 1.0")
+    work(w, "relight")
+    mixer = "light.mixer_of(scene).inputs"
+    assert "LG_group1" in w.get(f"[i.name for i in {mixer}]")
+    assert np.abs(shown(w, "ARTO Relit") - plate).max() <= ROUNDED
+
+    # Mix to Scene: a world that is the mix
+    w.do(f"{mixer}['LG_group1'].default_value = 0.25; world = scene.world.name")
+    press(w, "mix_to_scene")
+    assert w.get("scene.world.name != world")
+    w.do("scene.arto.layers = 'OFF'")
+
+    # Frames: a capture and a plate of each, shown one after the other; in the mixed light they are
+    # darker
+    w.do(
+        "scene.frame_start, scene.frame_end = 1, 2; bright = next(n for n in "
+        "scene.world.node_tree.nodes if n.type == 'BACKGROUND').inputs['Strength']; "
+        "bright.keyframe_insert('default_value', frame=1); bright.default_value = 0.25; "
+        "bright.keyframe_insert('default_value', frame=2)"
+    )
+    work(w, "capture_frames")
+    work(w, "relight_frames")
+    seen = []
+    for frame in (1, 2):
+        w.do(f"scene.frame_set({frame})")
+        w.wait(f"{TOLD} == 'ready'")
+        seen.append(shown(w, "ARTO Relit Frames"))
+    assert (plate - seen[0]).mean() > 5 and (seen[0] - seen[1]).mean() > 20
+    w.do("scene.frame_set(1); scene.world = bpy.data.worlds[world]")
+
+    # Delete: what relighting reads stays
+    w.do("folder = paths.place(scene).folder")
+    assert w.get("(folder / 'capture').is_dir()")
+    agree(w, "delete_capture")
+    w.wait("not (folder / 'capture').is_dir()")
+    w.wait(f"{TOLD} == 'ready'")
+
+    # Discard: what a cross has left
+    w.do("scene.frame_set(3); scene.arto.samples = 1 << 14")
+    press(w, "shoot")
+    w.wait("list(paths.place(scene).folder.glob('unfinished-*'))")
+    press(w, "cancel")
+    assert w.idle()[0] == "WARNING"
+    assert w.get("told(scene).stopped")
+    agree(w, "discard_unfinished")
+    w.wait("not told(scene).stopped")
+    assert not w.get("list(paths.place(scene).folder.glob('unfinished-*'))")
+    w.do("scene.frame_set(1); scene.arto.samples = 16")
+
+    # Use It Here: a copy of the file
+    copy = walk.blend.with_name("copy.blend")
+    w.do(f"bpy.ops.wm.save_as_mainfile(filepath={str(copy)!r})")
+    w.wait(f"{TOLD} == 'other'")
+    press(w, "adopt")
+    w.wait(f"{TOLD} == 'ready'")
+    work(w, "relight")
+    assert np.abs(shown(w, "ARTO Relit") - plate).mean() < 6
+    assert "Traceback" not in w.printed

@@ -21,7 +21,7 @@ from ...core.capture.names import BEHIND_LIGHT
 from ...core.errors import SceneError
 from ...core.hemicube import Hemicube
 from ..blender.markers import camera_of
-from ..blender.nodes import Nodes
+from ..blender.nodes import Input, Nodes
 from ..blender.reached import reached
 from ..stage.bounds import Rendered
 from ..stage.stage import Stage
@@ -33,7 +33,12 @@ def see_behind(on: Stage) -> None:
     nodes = Nodes(world.node_tree)
     # the film's exposure is in the pass
     strength = BEHIND_LIGHT / (on.scene.cycles.film_exposure or 1.0)
-    light = nodes.add("ShaderNodeBackground", (1, 1, 1, 1), strength).outputs[0]
+    shown: Input = strength
+    if (through := passes(on)) is not None:
+        # A render shows nothing behind more transparent surfaces; a capture lets a path pass more.
+        passed = world.node_tree.nodes.new("ShaderNodeLightPath").outputs["Transparent Depth"]
+        shown = nodes.math("MULTIPLY", nodes.math("LESS_THAN", passed, through + 0.5), strength)
+    light = nodes.add("ShaderNodeBackground", (1, 1, 1, 1), shown).outputs[0]
     nodes.add("ShaderNodeOutputWorld", light)
     rays = world.cycles_visibility
     for prop in rays.bl_rna.properties:
@@ -42,6 +47,13 @@ def see_behind(on: Stage) -> None:
     # it lights nothing, and is no lamp among others
     world.cycles.sampling_method = "NONE"
     layer.use_pass_environment = True
+
+
+def passes(on: Stage) -> int | None:
+    """How many transparent surfaces the artist's render lets a path pass; None if not prepared."""
+    found = on.changed.get("cycles.transparent_max_bounces", [None])[0]
+    # Cycles ends a path after the surface at which it counts this many, and so after one at least
+    return max(found, 1) if isinstance(found, int) else None
 
 
 def portals_seen(on: Stage, seen: Rendered) -> bool | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -16,10 +16,10 @@ from ...core.faces import FACE_NAMES
 from ...core.hemicube import Hemicube
 from ...core.patterns import BASE, SHARP, PatternSet, pattern_set
 from ..blender.markers import camera_of
-from ..blender.nodes import Input, Nodes, made_of_nodes, new_material
 from ..stage.stage import Stage, free_mark
-from .behind import beyond_clip
-from .shells import GAP, LID, PATTERN, Made, lid, threshold
+from .behind import beyond_clip, passes
+from .emission import most_passed, overriding_material, pattern_material
+from .shells import GAP, PATTERN, Made, lid, threshold
 
 COLLECTION = "ARTO Hemicube"
 # Distance of the patches that an artist looks at, in radii of the scene.
@@ -52,145 +52,6 @@ def wanted(scene: bpy.types.Scene, centre: Iterable[float], radius: float) -> He
         centre=(x, y, z),
         size=FAR * radius if s.far else s.size,
     )
-
-
-# Grains along a patch's side: far finer than the part of a patch that a pixel reflects.
-GRAINS = 2.0**14
-
-
-def _polynomial(nodes: Nodes, coefficients: Iterable[float]) -> bpy.types.NodeSocket:
-    """The value of a polynomial over `patterns.MONOMIALS` of the UV map."""
-    split = nodes.add("ShaderNodeSeparateXYZ", nodes.add("ShaderNodeUVMap").outputs[0])
-    u, v = split.outputs[0], split.outputs[1]
-    terms = (
-        1.0,
-        u,
-        nodes.math("MULTIPLY", u, u),
-        v,
-        nodes.math("MULTIPLY", v, v),
-        nodes.math("MULTIPLY", u, v),
-    )
-    total: Input = 0.0
-    for coefficient, term in zip(coefficients, terms, strict=True):
-        if coefficient:
-            total = nodes.math("MULTIPLY_ADD", term, float(coefficient), total)
-    # at a patch's rim rounding may put u or v below 0, and light must not be negative
-    return nodes.math("MAXIMUM", total, 0.0)
-
-
-def _grain(nodes: Nodes) -> bpy.types.NodeSocket:
-    """A random value for each grain: 1 on half of the grains, 0 on the others."""
-    scaled = nodes.add(
-        "ShaderNodeVectorMath",
-        nodes.add("ShaderNodeUVMap").outputs[0],
-        (GRAINS,) * 3,
-        operation="MULTIPLY",
-    )
-    cell = nodes.add("ShaderNodeVectorMath", scaled.outputs[0], operation="FLOOR")
-    noise = nodes.tree.nodes.new("ShaderNodeTexWhiteNoise")
-    noise.noise_dimensions = "3D"
-    nodes.tree.links.new(cell.outputs[0], noise.inputs["Vector"])
-    return nodes.math("GREATER_THAN", noise.outputs["Value"], 0.5)
-
-
-def _radiance(nodes: Nodes, name: str, patterns: PatternSet) -> list[Input]:
-    """What a pattern of the set, or `GRAIN`, emits: sockets or values, one for all channels or one
-    for each."""
-    if name == GRAIN:
-        return [_grain(nodes)]
-    return [
-        _grain(nodes) if row is None else _polynomial(nodes, row) for row in patterns.emission(name)
-    ]
-
-
-def _shader(
-    nodes: Nodes, shown: list[Input], radiance: float, hidden: Input = 0.0
-) -> bpy.types.NodeSocket:
-    """Emission, plus what lies behind; shown: see `_radiance`; radiance: what 1 of it is.
-
-    hidden: 1 where nothing lies behind.
-
-    The background lies behind the last pattern. There Cycles adds the scene's sun lamps to
-    scattered rays. An opaque patch would hide the suns' mirror images.
-    """
-    if len(shown) == 1:
-        colour: Input = (radiance, radiance, radiance, 1)
-        light = nodes.add("ShaderNodeEmission", colour, shown[0]).outputs[0]
-    else:
-        colour = nodes.add("ShaderNodeCombineColor", *shown).outputs[0]
-        light = nodes.add("ShaderNodeEmission", colour, radiance).outputs[0]
-    behind = nodes.add("ShaderNodeBsdfTransparent")
-    if hidden:
-        nodes.tree.links.new(nodes.math("SUBTRACT", 1.0, hidden), behind.inputs[0])
-    return nodes.add("ShaderNodeAddShader", light, behind.outputs[0]).outputs[0]
-
-
-def pattern_material(
-    name: str, patterns: PatternSet, sampled: bool = False, radiance: float = 1.0
-) -> bpy.types.Material:
-    """Emission of a pattern of the set (or of `GRAIN`), plus what lies behind."""
-    material = new_material(f"ARTO {name}")
-    # paths find the patches, and no shadow ray is cast at them: Cycles' limit of 255 light groups
-    # for sampled lights does not apply
-    material.cycles.emission_sampling = "FRONT_BACK" if sampled else "NONE"
-    tree = material.node_tree
-    tree.nodes.clear()
-    nodes = Nodes(tree)
-    nodes.add(
-        "ShaderNodeOutputMaterial", _shader(nodes, _radiance(nodes, name, patterns), radiance)
-    )
-    return material
-
-
-def overriding_material(
-    override: bpy.types.Material,
-    names: list[str],
-    patterns: PatternSet,
-    sampled: bool = False,
-    radiance: float = 1.0,
-) -> bpy.types.Material:
-    """A view layer's material override, on the artist's objects; on a plane, its pattern.
-
-    Blender puts the override on every object, whatever the object's slots hold. So one material
-    must serve all, and look at the object: a plane has the number of its pattern, from 1, as
-    property `PATTERN`.
-    """
-    material = override.copy()
-    material.cycles.emission_sampling = (
-        "FRONT_BACK" if sampled else "NONE"
-    )  # as in `pattern_material`
-    tree = made_of_nodes(material)
-    nodes = Nodes(tree)
-    number = tree.nodes.new("ShaderNodeAttribute")
-    number.attribute_type, number.attribute_name = "OBJECT", PATTERN
-    shown = [_radiance(nodes, name, patterns) for name in names]
-    total: list[Input] = [0.0] * max(map(len, shown))
-    for i, channels in enumerate(shown, 1):
-        mine = nodes.math("COMPARE", number.outputs["Fac"], float(i), 0.5)
-        for c in range(len(total)):
-            value = channels[c if len(channels) > 1 else 0]
-            total[c] = nodes.math("MULTIPLY_ADD", mine, value, total[c])
-    plane = nodes.math("GREATER_THAN", number.outputs["Fac"], 0.5)
-    hidden = nodes.math("COMPARE", number.outputs["Fac"], LID, 0.5)
-    output = tree.get_output_node("CYCLES") or tree.nodes.new("ShaderNodeOutputMaterial")
-    surface = _shader(nodes, total, radiance, hidden)
-    for socket, pattern in (("Surface", surface), ("Volume", None)):
-        links = output.inputs[socket].links
-        if not links and pattern is None:
-            continue
-        mix = tree.nodes.new("ShaderNodeMixShader")
-        tree.links.new(plane, mix.inputs[0])
-        if links:
-            tree.links.new(links[0].from_socket, mix.inputs[1])
-        if pattern:
-            tree.links.new(pattern, mix.inputs[2])
-        tree.links.new(mix.outputs[0], output.inputs[socket])
-    if links := output.inputs["Displacement"].links:
-        others = nodes.math("SUBTRACT", 1.0, plane)
-        scaled = nodes.add("ShaderNodeVectorMath", links[0].from_socket, operation="SCALE")
-        tree.links.new(others, scaled.inputs["Scale"])
-        tree.links.new(scaled.outputs[0], output.inputs["Displacement"])
-    return material
 
 
 def _plane(
@@ -231,15 +92,20 @@ def build(
     sampled: bool = False,
     radiance: float = 1.0,
     portals: bool = False,
+    most: Mapping[str, int] | None = None,
 ) -> None:
     """Fill `collection` with a plane for each (patch, pattern name) of `images`.
 
     mark: part of the names of light groups (`stage.free_mark`); without a mark the planes get no
-    light group. made: called with every new data-block, which it returns. portals: see `lit`.
+    light group. made: called with every new data-block, which it returns. portals: see `lit`;
+    most: for each pattern, see `emission.most_passed`.
     """
     images = list(images)
     used = list(dict.fromkeys(name for _, name in images))
-    materials = {name: made(pattern_material(name, patterns, sampled, radiance)) for name in used}
+    materials = {
+        name: made(pattern_material(name, patterns, sampled, radiance, (most or {}).get(name)))
+        for name in used
+    }
     centre = np.array(hemicube.centre)
     for k, pattern in images:
         name = group_name(k, pattern)
@@ -283,15 +149,18 @@ def lit(
     override = layer.material_override
     if portals:
         hemicube = beyond_clip(on.scene, hemicube)
+    names, most = list(dict.fromkeys(name for _, name in images)), None
+    # at patches that are sampled most paths end by a shadow ray, which does not meet the patterns
+    if (through := passes(on)) is not None and not sampled:
+        most = most_passed(patterns, names, through)
     try:
         if override:
-            names = list(dict.fromkeys(name for _, name in images))
-            shown = overriding_material(override, names, patterns, sampled, radiance)
+            shown = overriding_material(override, names, patterns, sampled, radiance, most)
             layer.material_override = note(shown)
         collection = note(bpy.data.collections.new("ARTO Capture"))
         on.scene.collection.children.link(collection)
         mark = free_mark()
-        build(collection, hemicube, patterns, images, note, mark, sampled, radiance, portals)
+        build(collection, hemicube, patterns, images, note, mark, sampled, radiance, portals, most)
         planes = list(collection.objects)
         if len(patterns) > 1:
             # One pattern alone has no ratios to keep, and the coin after it costs it no noise.
