@@ -29,6 +29,14 @@ from .shown import Shown, check_film
 # Said in a warning, and in the header of the plate.
 NO_DENOISER = "no: this Blender was built without Open Image Denoise"
 GLASS = "opaque: what is seen through it is in it, whatever Transparent Glass says"
+TINTED = (
+    "tinted glass before a shadow catcher is not yet as in a render where the ground is seen "
+    "through it: compare it with one (Verify), or take its tint away"
+)
+PORTALS = (
+    "what the world lights by way of a Ray Portal may have 2% less light than in a render, which "
+    "counts a world's light by portals otherwise on shadow rays"
+)
 
 
 @dataclass(frozen=True)
@@ -261,6 +269,11 @@ def warnings(shown: Shown, world: bpy.types.World | None) -> list[str]:
         out.append(f"denoising: {NO_DENOISER}")
     if scene.render.film_transparent and scene.cycles.film_transparent_glass:
         out.append(f"glass: {GLASS}")
+    through, clear = shown.field.through(), scene.render.film_transparent
+    if len(shown.takes) > 1 and not clear and through is not None:
+        out.append(TINTED)
+    if shown.field.about.portals is not None:
+        out.append(PORTALS)
     missing = [name for name in plate.DATA if not shown.field.has_layer(name)]
     if scene.arto.write_data and missing:
         lacks = f"the data file has no {', '.join(missing)}"

@@ -10,7 +10,8 @@ import pytest
 from arto.arto_addon import work
 from arto.arto_addon.blender.nodes import Nodes, new_material
 from arto.arto_addon.blender.output import float_exr, write_to
-from arto.arto_addon.relight import relight
+from arto.arto_addon.relight import ahead, relight
+from arto.arto_addon.relight.shown import Shown
 from arto.arto_addon.stage.stage import picture_region, stage
 from arto.arto_addon.world.background import background
 from arto.core import exr
@@ -100,6 +101,8 @@ def test_what_is_seen_through_panes(tmp_path):
         add_mesh(scene, "pane", corners, [(0, 1, 2, 3)], glass)
     scene.arto.write_data = True
     picture = run_all(scene)
+    said = ahead.warnings(Shown(scene, scene.view_layers[0].name), scene.world)
+    assert ahead.PORTALS in said and ahead.TINTED not in said  # there is no shadow catcher
     through = exr.read(tmp_path / "relit_data.exr")["through"]
     one, two = (own_picture(scene, 256, tmp_path, seed) for seed in (1, 2))
     assert (picture[..., 3] == 1).all()
