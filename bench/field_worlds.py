@@ -11,9 +11,9 @@ import bpy
 import numpy as np
 from arto.core import exr
 
-from .behind_cases import CASES
 from .building import noded
 from .field_cases import case
+from .kit_cases import CASES
 
 __all__ = ["CASES"]
 

@@ -169,11 +169,13 @@ def place(
             mirrored, normal = truth_at(scene, name, view, x, y)
             placed = placer.at(x, y, what)
             width = SIZE if what is What.REFLECT else 20.0
-            shown, index = render(scene, Kit((light_at(placed, width),)), 32)
+            many = 128 if name == "matt" else 32
+            shown, index = render(scene, Kit((light_at(placed, width),)), many)
             front = "pane" if name == "mirror" else name  # the mirror stands behind the pane
             mask = index == scene.objects[front].pass_index
             rough = name in ("brushed", "matt")
             level, smooth = (0.8, 3) if rough else (0.5, 1)
+            level = 0.985 if name == "matt" else level
             off = off_the_click(shown, mask, level, smooth, (x, y))
             aim = mirrored if what is What.REFLECT else normal
             rows.append(

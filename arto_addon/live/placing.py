@@ -21,6 +21,8 @@ from ..world import kept
 from ..world.check import check_world, world_of
 from .image import view_of
 
+# The cosine up to which a shaded normal is that of the surface itself.
+_ALIKE = 0.9
 # The name that a new light gets, by what it is to do.
 NAMES = {What.REFLECT: "Reflection", What.LIGHT: "Light", What.RIM: "Rim", What.SHADE: "Flag"}
 
@@ -61,21 +63,25 @@ class Placer:
         return grazing(lobes, normal, eye)
 
     def _normal_at(self, x: int, y: int, eye: np.ndarray | None) -> np.ndarray | None:
+        """The normal of a pixel: the shaded one of the guides where the surface has one.
+
+        On mirrors and glass the guide is that of what they show. The places of the neighbours tell
+        such a guide.
+        """
         if eye is None:
             return None
-        if self._position is not None:
-            found = normal_at(self._position, x, y, eye)
-            if found is not None:
-                return found
+        flat = None if self._position is None else normal_at(self._position, x, y, eye)
         camera = camera_of(self.scene)
         if self._normal is None or camera is None:
-            return None
+            return flat
         # The guide is in the camera's space, with its third axis ahead.
         given = self._normal[y, x].astype(np.float64)
-        if np.linalg.norm(given) < 0.5:
-            return None
+        size = float(np.linalg.norm(given))
+        if size < 0.5:
+            return flat
         turned = np.array(camera.matrix_world.to_3x3().normalized())
-        return turned @ (given * (1, 1, -1))
+        shaded = turned @ (given * (1, 1, -1)) / size
+        return shaded if flat is None or float(shaded @ flat) > _ALIKE else flat
 
     def close(self) -> None:
         """Let go of the field's files."""

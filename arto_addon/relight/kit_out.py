@@ -11,7 +11,7 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 from ...core import exr
-from ...core.errors import KitError, SceneError
+from ...core.errors import KitError
 from ...core.kit.found import lights_of
 from ...core.kit.light import Blend, Kind, Light
 from ...core.kit.model import Base, BaseKind, Kit, free_name
@@ -35,7 +35,7 @@ NARROWEST, WIDEST = 1024, 8192
 FAR = 1000.0
 
 
-def _width(world: bpy.types.World) -> int:
+def width_of(world: bpy.types.World) -> int:
     """The width of a map with all detail of a world: a power of two."""
     found = detail(world)
     wanted = 4096 if found >= FINEST else found
@@ -48,7 +48,7 @@ def to_hdri(scene: bpy.types.Scene, path: Path) -> tuple[int, int]:
     Any world will do, with a kit or without. Raises SceneError, CancelledError.
     """
     world = check_world(scene, layer_of(scene))
-    image = bake(scene, _width(world), None, world).image
+    image = bake(scene, width_of(world), None, world).image
     exr.write(path, {"": image}, None, working_space())
     return image.shape[1], image.shape[0]
 
@@ -67,7 +67,7 @@ def suns_to_lights(scene: bpy.types.Scene) -> list[str]:
     copy = world.copy()
     try:
         kits.write(copy, plain)
-        environment = bake(scene, min(_width(copy), 4096), None, copy)
+        environment = bake(scene, min(width_of(copy), 4096), None, copy)
     finally:
         bpy.data.worlds.remove(copy)
     rest, found = lights_of(environment)
@@ -177,11 +177,3 @@ def _lamp(
     lamp.matrix_world = Matrix.Translation(middle + Vector(ahead) * distance) @ turn
     scene.collection.objects.link(lamp)
     return lamp.name
-
-
-def check_one(scene: bpy.types.Scene) -> bpy.types.World:
-    """The world of a scene, whose kit a script reads or writes. Raises SceneError."""
-    world = scene.world
-    if world is None:
-        raise SceneError("the scene has no world: add one (World properties)")
-    return world

@@ -32,6 +32,7 @@ from ..relight.relight import relight
 from ..shot import home, paths, scene_id
 from ..shot.adopting import adopt, adopt_from
 from ..work import Batch, ProgressLines, Steps, run, strictly
+from .cli_light import give, light
 from .inventory import FORMAT, Inventory, inventory
 from .options import EVERY_FRAME, parser
 from .report import CODES, OpenJDLines, OptionError, Report, check_file
@@ -68,6 +69,10 @@ def main(arguments: list[str]) -> int:
     try:
         if verb == "status":
             return _status(options)
+        if verb == "light":
+            scene, layer = _scene(options)
+            light(scene, layer, options)
+            return 0
         lines = OpenJDLines() if options.get("openjd") else ProgressLines(verb)
         file = options.pop("json", None)
         report = Report(verb, file.resolve() if file else None, lines)
@@ -100,7 +105,10 @@ def _do(verb: str, options: dict[str, Any], report: Report) -> None:
     frames, only_estimate = options.pop("frames", None), options.pop("estimate", False)
     planned = {name: options.pop(name, None) for name in ("job", "tiles", "seeds")}
     worlds, turns = options.pop("worlds", None), options.pop("turntable", 1)
+    kit = options.pop("kit", None)
     _set(scene, options)
+    if kit is not None:
+        give(scene, layer, kit.resolve())
     if verb == "adopt":
         _adopt(scene, layer, source)
         return

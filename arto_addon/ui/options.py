@@ -59,6 +59,9 @@ def parser() -> argparse.ArgumentParser:
                 "--worlds", nargs="+", type=Path, help="environment maps, in the world's place"
             )
             one.add_argument(
+                "--kit", type=Path, metavar="FILE", help="a light kit that the world gets first"
+            )
+            one.add_argument(
                 "--turntable",
                 type=_from_one,
                 default=1,
@@ -75,6 +78,7 @@ def parser() -> argparse.ArgumentParser:
                 default=1,
                 help="renders of each, whose light is averaged",
             )
+    _add_light(jobs.add_parser("light", parents=[files], help="read or write the light kit"))
     _add_adopt(jobs.add_parser("adopt", parents=[files], help="use another file's captures"))
     _add_status(jobs.add_parser("status", parents=[files], help="say what there is of a shot"))
     for name, text in (("part", "render a part of a job"), ("gather", "join a job's parts")):
@@ -112,6 +116,21 @@ def _told() -> argparse.ArgumentParser:
         help="write down what was written, warned of and failed",
     )
     return out
+
+
+def _add_light(one: argparse.ArgumentParser) -> None:
+    one.add_argument(
+        "--json",
+        type=Path,
+        metavar="FILE",
+        help="a file that is there: the world gets its kit; else the world's kit is written there "
+        "(-: in the last line)",
+    )
+    one.add_argument("--write", action="store_true", help="write the file though it is there")
+    one.add_argument("--save", action="store_true", help="save the .blend with the kit of the file")
+    one.add_argument(
+        "--hdri", type=Path, metavar="EXR", help="write the world's light, with a kit or without"
+    )
 
 
 def _add_adopt(one: argparse.ArgumentParser) -> None:
