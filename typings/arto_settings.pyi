@@ -37,6 +37,7 @@ class Settings:
     layer_prefix: str
     layers_files: Literal["ONE", "EACH"]
     layers_half: bool
+    scripts: bool
     write_data: bool
     cryptomatte: str
     shadows: Literal["MULTIPLY", "ADD"]

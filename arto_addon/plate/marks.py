@@ -12,6 +12,8 @@ from pathlib import Path
 from ...core import exr
 from ...core.errors import ArtoError, SceneError
 from ...core.file_names import is_text, same_file
+from ...core.mix.stamp import is_own
+from ...core.regular import read_regular
 
 # The attribute in the header of each file of a plate that names the plate's own file.
 PLATE = "arto.plate"
@@ -19,10 +21,14 @@ PLATE = "arto.plate"
 _OF_EARLIER = ("arto.light key", "arto.verify")
 # What the names of files beside a plate end with.
 ENDINGS = ("catcher", "light", "layers", "data", "comp", "verify")
+# What the names of scripts for compositors beside a plate end with; no script is as long as that.
+SCRIPTS, _LONG = (".nk", ".comp"), 1 << 22
 
 
 def is_of(path: Path, plate: Path) -> bool:
     """Whether ARTO has written a file beside a plate, by what the file's header says."""
+    if path.suffix in SCRIPTS:
+        return path.stem == plate.stem and is_own_script(path)
     head = _header(path)
     if PLATE in head:
         return str(head[PLATE]) == plate.name
@@ -33,9 +39,19 @@ def is_of(path: Path, plate: Path) -> bool:
 
 
 def is_marked(path: Path) -> bool:
-    """Whether ARTO has written a picture, of whatever plate."""
+    """Whether ARTO has written a picture or a script, of whatever plate."""
+    if path.suffix in SCRIPTS:
+        return is_own_script(path)
     head = _header(path)
     return PLATE in head or any(name in head for name in _OF_EARLIER)
+
+
+def is_own_script(path: Path) -> bool:
+    """Whether a script for a compositor is as ARTO has written it."""
+    try:
+        return is_own(read_regular(path, _LONG).decode("utf-8"))
+    except (OSError, ValueError):
+        return False
 
 
 def _header(path: Path) -> dict[str, object]:

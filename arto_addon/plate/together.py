@@ -16,7 +16,7 @@ from ...core import exr, marked
 from ...core.errors import ExrError
 from ...core.files import whole
 from . import marks
-from .marks import ENDINGS, is_of
+from .marks import ENDINGS, SCRIPTS, is_of
 from .plate import LAYERS, full_file, layers_prefix
 
 
@@ -102,6 +102,7 @@ def beside(plate: Path, prefixes: set[str]) -> list[Path]:
     """Files that have names as ARTO gives them beside a plate. prefixes: of the names of layers."""
     found = [plate.with_name(f"{plate.stem}_{ending}.exr") for ending in ENDINGS]
     found += [full_file(path) for path in (plate, *found)]
+    found += [plate.with_suffix(ending) for ending in SCRIPTS]
     there = {path for path in found if path.is_file()}
     begins = tuple(f"{plate.stem}_{prefix}" for prefix in prefixes)
     if begins and plate.parent.is_dir():

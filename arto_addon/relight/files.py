@@ -13,9 +13,10 @@ from ...core.catcher import Caught
 from ...core.exr.writing import Opener
 from ..plate import plate
 from ..plate.marks import PLATE
+from ..plate.names import relit_file
 from ..plate.together import Together
 from ..work import Progress, Steps, Wrote
-from . import ahead, layers
+from . import ahead, layers, scripts
 from .shown import Ready, Shown
 
 
@@ -83,7 +84,8 @@ def _written(
         share = plate.share_file(path)
         plate.write(scene, share, caught.share, about, shows=True, opener=opener)
         if settings.shadows == "ADD":
-            plate.write(scene, plate.light_file(path), caught.light, about, opener=opener)
+            light = np.dstack([caught.light, caught.alpha])
+            plate.write(scene, plate.light_file(path), light, about, opener=opener)
         yield from _into_footage(shown, ready, caught, about, opener)
     if settings.write_data:
         mattes = shown.mattes()
@@ -97,6 +99,11 @@ def _written(
             found[layers.BEHIND] = picture[..., :3] - made.things
         attributes, space = plate.header_of(scene, about)
         yield from layers.write(scene, path, picture, found, attributes, space, opener)
+        if settings.scripts and path == relit_file(scene):
+            files = layers.files_by_name(scene, path, found)
+            yield from scripts.write(
+                path, scripts.described(scene, path, files, bool(caught)), opener
+            )
 
 
 def _into_footage(

@@ -105,10 +105,10 @@ def _all(scene: bpy.types.Scene) -> Iterator[Input]:
         yield Input("the .blend", Path(home.file()))
     # what else Blender reads, but for the plates that it shows
     for source in [*bpy.data.images, *bpy.data.movieclips]:
-        if source.filepath and not is_marked(_absolute(source)):
+        if source.filepath and _is_others(_absolute(source)):
             yield from _of_image("a file of the scene", source)
     for path in map(Path, bpy.utils.blend_paths(absolute=True)):
-        if not is_marked(path):
+        if _is_others(path):
             yield Input("a file of the scene", path)
     for volume in bpy.data.volumes:
         if volume.is_sequence:
@@ -116,6 +116,14 @@ def _all(scene: bpy.types.Scene) -> Iterator[Input]:
     for cache in bpy.data.cache_files:
         if cache.is_sequence:
             yield _sequence("a cache of the scene", _absolute(cache))
+
+
+def _is_others(path: Path) -> bool:
+    """Whether a file is there, or may be, that ARTO has not written.
+
+    A companion of an older plate may be gone while Blender still has its image.
+    """
+    return not is_marked(path) and (path.exists() or has_number(path))
 
 
 def _trees() -> Iterator[bpy.types.NodeTree]:

@@ -8,6 +8,7 @@ compositor has a gain and a tint for each layer.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -76,6 +77,16 @@ def own_files(scene: bpy.types.Scene, path: Path, field: Field) -> list[Path]:
     own = field.own_layers if settings.own_lamps else []
     names = [channel_name(scene, name) for name in (*parts, *own, OWN, BEHIND)]
     return list(layer_files(path, names).values())
+
+
+def files_by_name(
+    scene: bpy.types.Scene, path: Path, layers: Iterable[str]
+) -> dict[str, str | None]:
+    """By the name of each layer in files the name of its own file; None where all are in one."""
+    names = [channel_name(scene, name) for name in layers]
+    if scene.arto.layers_files != "EACH":
+        return dict.fromkeys(names)
+    return {name: file.name for name, file in layer_files(path, names).items()}
 
 
 def _check(scene: bpy.types.Scene) -> None:

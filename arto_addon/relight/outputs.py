@@ -11,7 +11,7 @@ from ...core.units import size
 from ..capture import room
 from ..plate import marks, plate
 from ..plate.footage import footage
-from ..plate.marks import ENDINGS
+from ..plate.marks import ENDINGS, SCRIPTS
 from ..shot.home import check_outside
 from . import layers
 from .inputs import Inputs, inputs
@@ -62,7 +62,8 @@ def check_picture(shown: Shown, path: Path, read: Inputs | None = None) -> None:
 def possible(path: Path) -> list[Path]:
     """A picture's file, and all that may stand beside it under names of its own."""
     found = [path, *(path.with_name(f"{path.stem}_{ending}.exr") for ending in ENDINGS)]
-    return found + [plate.full_file(output) for output in found]
+    scripts = [path.with_suffix(ending) for ending in SCRIPTS]
+    return found + [plate.full_file(output) for output in found] + scripts
 
 
 def files_of(shown: Shown, path: Path) -> list[Path]:

@@ -185,6 +185,19 @@ FILES = (
         panels=("Layers",),
     ),
     Setting(
+        name="scripts",
+        kind="switch",
+        title="Scripts for Compositors",
+        words="Write a script for Nuke and one for Fusion beside the layers, which add them up "
+        "with the gains that the mixer has now. One that was changed and saved stays",
+        default=True,
+        work="relight",
+        decides=Decides.PLATE,
+        farm=False,
+        option=True,
+        panels=("Layers",),
+    ),
+    Setting(
         name="write_data",
         kind="switch",
         title="Write Data",

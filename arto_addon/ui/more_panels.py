@@ -73,6 +73,7 @@ class Layers(Draws):
             column.prop(settings, "layer_prefix", text="Prefix")
             column.prop(settings, "layers_files", text="")
             column.prop(settings, "layers_half")
+            column.prop(settings, "scripts")
             column.operator("arto.mix_to_scene", icon="WORLD_DATA")
         say(column, context, "Footage")
         column.prop(settings, "footage", text="")

@@ -20,17 +20,17 @@ def relit(scene, **settings):
     wrote = []
     steps = relight.compute(scene, scene.view_layers[0].name)
     work.run(steps, lambda step: wrote.append(step.path) if isinstance(step, Wrote) else None)
-    folder = relit_file(scene).parent
-    return {path.name for path in folder.glob("*.exr")}, {path.name for path in wrote}
+    folder, ours = relit_file(scene).parent, (".exr", ".nk", ".comp")
+    there = {path.name for path in folder.iterdir() if path.suffix in ours}
+    return there, {path.name for path in wrote}
 
 
 def test_what_another_relight_left_beside_a_plate_goes(shot):
     base = relit_file(shot).stem
     off = {"layers": "OFF", "write_data": False, "data_window": "FULL", "layers_files": "ONE"}
     before, wrote = relit(shot, layers="FACES", write_data=True, data_window="CROP")
-    assert wrote == {
-        f"{base}{end}.exr" for end in ("", "_full", "_layers", "_layers_full", "_data")
-    }
+    pictures = {f"{base}{end}.exr" for end in ("", "_full", "_layers", "_layers_full", "_data")}
+    assert wrote == pictures | {f"{base}.nk", f"{base}.comp"}
     assert wrote <= before
     theirs = plate.layers_file(relit_file(shot)).with_name(f"{base}_comp.exr")
     exr.write(theirs, {"": np.ones((2, 2, 3), np.float32)})  # an artist's, by its header

@@ -1,0 +1,95 @@
+"""Scripts for compositors beside a plate: what their nodes make of its files is the plate, the mix,
+and the comp on footage."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import mix_tools
+import numpy as np
+import pytest
+from arto.arto_addon import work
+from arto.arto_addon.blender.compositing import compositor
+from arto.arto_addon.plate import plate
+from arto.arto_addon.relight import relight
+from arto.core import exr
+from scene_tools import captured
+from shot_tools import with_catcher
+
+RUNS = {".nk": mix_tools.nuke, ".comp": mix_tools.fusion}
+
+
+def files_in(folder: Path) -> dict[str, dict[str, np.ndarray]]:
+    """The channels of all EXR files of a folder, by path."""
+    return {
+        str(path): {
+            f"{part}.{c}" if part else c: pixels[..., i]
+            for part, pixels in exr.read(path).items()
+            for i, c in enumerate("RGBA"[: pixels.shape[-1]])
+        }
+        for path in folder.glob("*.exr")
+        if not path.stem.endswith("_data")
+    }
+
+
+def made(path: Path, node: str) -> dict[str, np.ndarray]:
+    """What each script beside a plate makes at a node, by ending."""
+    files = files_in(path.parent)
+    return {
+        ending: mix_tools.rgb(
+            run(path.with_suffix(ending).read_text("utf-8"), files, str(path.parent))[node]
+        )
+        for ending, run in RUNS.items()
+    }
+
+
+def test_a_script_makes_the_plate_and_the_mix(lit):
+    path, _ = work.run(relight.relight(lit))
+    beauty = exr.read(path)[""][..., :3]
+    for found in made(path, "Mix").values():
+        np.testing.assert_allclose(found, beauty, atol=1e-5 * beauty.max())
+    mixer = next(n for n in compositor(lit).nodes if "LG_top" in n.inputs)
+    mixer.inputs["LG_top"].default_value, mixer.inputs["Exposure"].default_value = 0.25, 1.0
+    mixer.inputs["LG_own Tint"].default_value = (1.0, 0.5, 0.0, 1.0)
+    lit.arto.layers_files = "EACH"
+    work.run(relight.relight(lit))
+    layers = exr.read(plate.layers_file(path))
+    gains = {"LG_top": 0.25, "LG_own": np.array([1.0, 0.5, 0.0])}
+    mix = sum(layers[name] * gains.get(name, 1.0) for name in layers if name)
+    for found in made(path, "Mix").values():
+        np.testing.assert_allclose(found, 2 * mix, atol=1e-5 * mix.max())
+
+
+def test_a_script_that_was_changed_stays(lit):
+    path, _ = work.run(relight.relight(lit))
+    changed, other = path.with_suffix(".nk"), path.with_suffix(".comp")
+    changed.write_text(changed.read_text("utf-8") + "Viewer {\n}\n", "utf-8")
+    before = changed.read_bytes()
+    said: list[str] = []
+    work.run(relight.relight(lit), lambda step: said.append(step.text))
+    assert changed.read_bytes() == before and any("it stays" in text for text in said)
+    lit.arto.layers = "OFF"
+    work.run(relight.relight(lit))
+    assert changed.read_bytes() == before and not other.exists()
+
+
+@pytest.mark.parametrize("shadows", ["MULTIPLY", "ADD"])
+def test_a_script_makes_the_comp_on_footage(tmp_path, shadows):
+    scene = with_catcher(tmp_path, samples=4, patches=1)
+    captured(scene)
+    scene.arto.layers, scene.arto.layers_half, scene.arto.shadows = "FACES", False, shadows
+    path = Path(bpy.path.abspath(scene.arto.output or "//shot_relit.exr"))
+    filmed = np.random.default_rng(0).random((18, 24, 4)).astype(np.float32)
+    filmed[..., 3] = 1
+    folder = tmp_path / "footage"
+    folder.mkdir()
+    exr.write(folder / "filmed.exr", {"": filmed}, {}, "lin_rec709_scene")
+    scene.arto.footage = bpy.data.images.load(str(folder / "filmed.exr"))
+    path, _ = work.run(relight.relight(scene))
+    comp = exr.read(plate.comp_file(path))[""]
+    files = files_in(path.parent) | files_in(folder)
+    for ending, run in RUNS.items():
+        script = path.with_suffix(ending).read_text("utf-8")
+        found = mix_tools.rgb(run(script, files, str(path.parent))["Composite"])
+        np.testing.assert_allclose(found, comp[..., :3], atol=2e-5 * comp.max())
