@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from arto.core import exr
 from program_tools import Program
 from walk_tools import ARRANGE, TAB, WATCH, Walk
 from window_tools import Window, ended, windows
@@ -169,6 +170,7 @@ TOLD = "told(scene).kind"
 STATE = """
 told = next(m for n, m in sys.modules.items() if n.endswith(".arto_addon.ui.state")).told
 light = next(m for n, m in sys.modules.items() if n.endswith(".arto_addon.ui.light_panel"))
+shelf = next(m for n, m in sys.modules.items() if n.endswith(".arto_addon.world.shelf"))
 scene.arto.live_finish, scene.arto.compare = True, "OFF"
 """
 
@@ -191,6 +193,26 @@ def test_what_the_buttons_do_with_a_shot(walk: Walk) -> None:
         True, 1, 64,
     ]  # fmt: skip
     w.do("bpy.data.objects.remove(other)")
+
+    # the strip of HDRIs: a click on one of an asset library lights the scene
+    library = walk.blend.parent / "library"
+    library.mkdir()
+    exr.write(library / "even.exr", {"": np.ones((32, 64, 3), np.float32)})
+    w.do(
+        "bpy.context.preferences.filepaths.asset_libraries.new(name='Ours', "
+        f"directory={str(library)!r}); sky = scene.world.node_tree.nodes; "
+        "[a.tag_redraw() for a in bpy.context.window_manager.windows[0].screen.areas]"
+    )
+    w.wait("len(shelf.items()) == 2")  # the HDRI of the capture was remembered
+    even = f'bpy.ops.arto.use_hdri(filepath="{library / "even.exr"}", world="")'
+    w.click(*w.button(even, 0.37, 320))
+    shown_now = "next(n.image for n in sky if n.type == 'TEX_ENVIRONMENT')"
+    w.wait(f"{shown_now}.name == 'even.exr'")
+    w.do(
+        "bpy.ops.arto.use_hdri(filepath=next(i.path for i in shelf.items() "
+        "if not i.path.endswith('even.exr')))"
+    )
+    assert w.get(f"{shown_now}.name") != "even.exr"
 
     # Groups: a layer of its own, and the picture as before
     for _ in range(2):

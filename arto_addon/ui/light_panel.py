@@ -17,7 +17,7 @@ from ..relight.layers import prefix_of
 from ..shot import status
 from ..world import controls, dials
 from ..world.check import world_of
-from . import thumbnails
+from . import strip, thumbnails
 from .kit_panel import draw_kit
 from .places import Draws, say, sentence, slot
 from .result_panel import header_of
@@ -53,6 +53,7 @@ def _world(column: bpy.types.UILayout, context: bpy.types.Context, world: bpy.ty
         row = column.row()
         row.alignment = "CENTER"
         row.template_icon(thumbnails.of_hdri(image), scale=4.5)
+    strip.draw(column, context, world)
     nodes = controls.texture_nodes(world)
     if nodes:
         column.template_ID(nodes[0], "image", open="image.open")

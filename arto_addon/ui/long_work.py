@@ -10,6 +10,7 @@ from ..job import session
 from ..job.verbs import Verb
 from ..shot.shot import layer_of
 from ..work import ProgressLines, Steps, run
+from ..world import shelf
 
 
 class LongWork(bpy.types.Operator):
@@ -59,6 +60,7 @@ class LongWork(bpy.types.Operator):
             self.check(scene)
             before = scene.arto.scene_id
             session.start(self.verb, scene, layer)
+            shelf.note_shown(scene)
             if scene.arto.scene_id != before:
                 # an undo step with the new ID: undoing past it would lose the capture made under it
                 bpy.ops.ed.undo_push(message="ARTO Scene ID")

@@ -20,12 +20,12 @@ from ..shot.shot import layer_of
 from ..stage.stage import picture_size
 from ..stage.takes import TAKES, WHOLE
 from ..work import Steps
-from ..world import controls, hdris
-from ..world.check import world_of
+from ..world import hdris
 from . import state
 from .before import before_capture, check_capture
 from .long_work import LongWork
 from .operators import Quick, Removes, can_capture, can_relight, free, own_place, remove_capture
+from .strip import light_with
 
 
 class ARTO_OT_shoot(LongWork):
@@ -118,21 +118,8 @@ class ARTO_OT_open_hdri(Quick):
         return {"RUNNING_MODAL"}
 
     def work(self, context: bpy.types.Context) -> str:
-        scene = context.scene
-        path = Path(bpy.path.abspath(self.filepath))
-        hdris.check(path)
-        try:
-            image = bpy.data.images.load(str(path), check_existing=True)
-        except RuntimeError as e:
-            raise SceneError(f"{path} cannot be read ({e}): choose an HDRI") from e
-        world = world_of(scene)
-        if world is None:
-            world = bpy.data.worlds.new(Path(self.filepath).stem)
-            scene.world = world
-        if world.library:
-            raise SceneError("the world is linked from a library: make it local to change it")
-        controls.set_hdri(world, image)
-        return f"the world shows {image.name}"
+        name = light_with(context.scene, Path(bpy.path.abspath(self.filepath)))
+        return f"the world shows {name}"
 
 
 class ARTO_OT_add_look(Quick):

@@ -89,6 +89,7 @@ class ArtoWindow(bpy.types.PropertyGroup):
         set=_set_overlay,
         options={"SKIP_SAVE"},
     )
+    strip: IntProperty(name="Strip", description="Which part of the strip of HDRIs is shown", min=0)
     seen: StringProperty(name="Seen", description="What the last look inside found")
     seen_in: StringProperty(name="Seen In", description="The scene that was looked into")
 

@@ -65,6 +65,17 @@ def displayed(pixels: NDArray) -> NDArray[np.float32]:
     return np.concatenate([light ** (1 / 2.2), np.clip(alpha, 0, 1)], axis=-1).astype(np.float32)
 
 
+def of_file(path: str, world: str = "") -> int:
+    """The icon of an HDRI, or of a world in a .blend, which Blender reads meanwhile; 0 without a
+    window."""
+    if not _pictures:
+        return 0
+    key = f"{path}/World/{world}" if world else path
+    if key not in _pictures[0]:
+        _pictures[0].load(key, key, "BLEND" if world else "IMAGE")
+    return _pictures[0][key].icon_id
+
+
 def of_hdri(image: bpy.types.Image) -> int:
     """The icon of an HDRI."""
     preview = image.preview_ensure()

@@ -36,6 +36,8 @@ Light from Here | Licht von hier | ここからの光
 Verify | Prüfen | 検証
 Save Composite | Composite speichern | 合成を保存
 Open HDRI | HDRI öffnen | HDRIを開く
+Use This HDRI | Dieses HDRI verwenden | このHDRIを使う
+More HDRIs | Weitere HDRIs | 他のHDRI
 Add Look | Stimmung hinzufügen | ルックを追加
 Remove Look | Stimmung entfernen | ルックを削除
 Keep This Light as a Look | Dieses Licht als Stimmung behalten | この光をルックとして保存
