@@ -81,6 +81,29 @@ def _measured(stage: str, work: Callable[[], Any]) -> Row:
     return {"stage": stage, "seconds": seconds, "cpu_seconds": cpu, **asdict(count)}
 
 
+class Parts:
+    """Where the seconds of a piece of work go, by what it says that it does."""
+
+    def __init__(self) -> None:
+        self._now = "begin", time.perf_counter(), time.process_time()
+        self._found: dict[str, list[float]] = {}
+
+    def __call__(self, step: Any) -> None:
+        text, begun, worked = self._now
+        now = time.perf_counter(), time.process_time()
+        part = self._found.setdefault(text, [0.0, 0.0])
+        part[0] += now[0] - begun
+        part[1] += now[1] - worked
+        self._now = step.text, *now
+
+    def ended(self) -> dict[str, list[float]]:
+        """Seconds, and seconds of all threads, by what was done."""
+        self(self)
+        return {text: [round(s, 2) for s in part] for text, part in self._found.items()}
+
+    text = ""
+
+
 def _settings(scene: Any, size: Size, folder: Path) -> None:
     settings = scene.arto
     settings.folder, settings.output = str(folder / "arto"), str(folder / "relit.exr")
@@ -106,9 +129,12 @@ def capture(scene: Any, size: Size, folder: Path) -> list[Row]:
     from arto.core.field.field import Field
 
     made: list[Path] = []
-    row = _measured(
-        "capture", lambda: made.append(work.run(steps(scene, scene.view_layers[0].name)))
-    )
+    parts = Parts()
+
+    def do() -> None:
+        made.append(work.run(steps(scene, scene.view_layers[0].name), parts))
+
+    row = _measured("capture", do) | {"parts": parts.ended()}
     field = Field(made[0].with_name("field"))
     return [row | {"tiles": len(field.tiles), "patches": len(field.hemicube)}]
 
@@ -120,8 +146,9 @@ def probe(scene: Any, size: Size, folder: Path) -> list[Row]:
 
     found: list[Any] = []
     steps = estimate(scene, scene.view_layers[0].name)
-    row = _measured("before the first tile", lambda: found.append(work.run(steps)))
-    return [row | {"told_seconds": found[0].seconds}]
+    parts = Parts()
+    row = _measured("before the first tile", lambda: found.append(work.run(steps, parts)))
+    return [row | {"told_seconds": found[0].seconds, "parts": parts.ended()}]
 
 
 STAGES: dict[str, Callable[[Any, Size, Path], list[Row]]] = {

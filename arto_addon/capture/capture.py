@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -200,6 +200,7 @@ def _render_tiles(on: Stage, folder: Path, head: CaptureHead) -> Steps[CaptureHe
     """
     tiles = len(head.tiles)
     stream = None if head.kept else Stream(folder)
+    around = Around(on, head)
     heads.write(folder, head)
 
     def take(patience: float | None) -> bool:
@@ -225,7 +226,7 @@ def _render_tiles(on: Stage, folder: Path, head: CaptureHead) -> Steps[CaptureHe
                     yield from fit(t)
                 continue
             begun_at = time.perf_counter()
-            files = yield from render_tile(on, head, t, folder)
+            files = yield from render_tile(on, head, t, folder, around)
             seconds = (head.seconds or 0.0) + time.perf_counter() - begun_at
             done = {"files": tuple(files), "sums": sums_of(folder, files), "done": True}
             head = replace(head.with_tile(t, **done), seconds=seconds)
@@ -235,6 +236,7 @@ def _render_tiles(on: Stage, folder: Path, head: CaptureHead) -> Steps[CaptureHe
         while take(0.1):
             yield Progress(0.99, f"fitting tile {tiles} of {tiles}")
     finally:
+        around.__exit__()
         if stream:
             stream.stop()
     return head
@@ -246,19 +248,45 @@ def plan_of(head: CaptureHead) -> list[list[tuple[int, str]]]:
     return render_plan(head.told_route, head.hemicube, names)
 
 
-def set_tile(
-    on: Stage, head: CaptureHead, number: int, images: list[tuple[int, str]]
-) -> AbstractContextManager[None]:
-    """Make the stage ready to render some images of a tile."""
-    set_region(on.scene, head.tiles[number].region)
-    # the scene's own lamps are in every render; the first render separates them by group
-    sampled = head.route == Route.SAMPLED
-    own = not sampled and images == plan_of(head)[0]
-    faint, portals = head.radiance or 1.0, bool(head.portals)
-    return planes.lit(on, head.hemicube, head.patterns, images, sampled, own, faint, portals)
+class Around:
+    """The planes around a stage, which stay from one tile to the next.
+
+    Cycles prepares the scene again when planes come or go. So they are changed only where a render
+    needs others than the last.
+    """
+
+    def __init__(self, on: Stage, head: CaptureHead) -> None:
+        self._on, self._head = on, head
+        self._held = ExitStack()
+        self._images: list[tuple[int, str]] | None = None
+
+    def __enter__(self) -> Around:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._images = None
+        self._held.close()
+
+    def set_tile(self, number: int, images: list[tuple[int, str]]) -> None:
+        """Make the stage ready to render some images of a tile."""
+        on, head = self._on, self._head
+        set_region(on.scene, head.tiles[number].region)
+        if images == self._images:
+            return
+        self.__exit__()
+        # the scene's own lamps are in every render; the first render separates them by group
+        sampled = head.route == Route.SAMPLED
+        own = not sampled and images == plan_of(head)[0]
+        faint, portals = head.radiance or 1.0, bool(head.portals)
+        self._held.enter_context(
+            planes.lit(on, head.hemicube, head.patterns, images, sampled, own, faint, portals)
+        )
+        self._images = images
 
 
-def render_tile(on: Stage, head: CaptureHead, number: int, folder: Path) -> Steps[list[str]]:
+def render_tile(
+    on: Stage, head: CaptureHead, number: int, folder: Path, around: Around
+) -> Steps[list[str]]:
     """Render the missing files of a tile into a folder -> the names of all its files."""
     plan, tiles = plan_of(head), len(head.tiles)
     total = len(plan) * tiles
@@ -269,9 +297,9 @@ def render_tile(on: Stage, head: CaptureHead, number: int, folder: Path) -> Step
         name = f"tile_{number:04d}.exr" if len(plan) == 1 else f"tile_{number:04d}_{i:04d}.exr"
         # a killed process may have finished the file without noting it down
         if not is_whole(folder / name, images):
+            around.set_tile(number, images)
             work = Render(on.scene.name, at / total, text, 1 / total)
-            around = set_tile(on, head, number, images)
-            yield from _render(on, around, images, folder / name, work)
+            yield from _render(on, images, folder / name, work)
         files.append(name)
     return files
 
@@ -289,17 +317,16 @@ def is_whole(path: Path, images: list[tuple[int, str]]) -> bool:
 
 def _render(
     on: Stage,
-    around: AbstractContextManager[None],
     images: list[tuple[int, str]],
     path: Path,
     request: Render,
 ) -> Steps[None]:
-    """Render some basis images into `path`. around: puts their planes around the stage."""
+    """Render some basis images into `path`. Their planes are around the stage."""
     with whole(path) as partial:
         write_to(on.scene.render, partial)
-        with around:
-            yield request
-            request.check()
+        on.about_to_render()
+        yield request
+        request.check()
         if not partial.stat().st_size:
             raise CaptureSetError(
                 f"Blender did not write {path}: make room on the disk, or choose a folder that "

@@ -1,8 +1,8 @@
 """A check of the light before the long render: do the patches light the scene as a world does?
 
-A small picture is rendered under all patches, and twice in a plain white world. Some settings of a
-scene and some tricks in materials let a world's light in and keep the patches' light out. They show
-as a difference between the pictures, whether this module knows of them or not.
+A small picture is rendered under all patches, and twice in a plain white world (`look`). Some
+settings of a scene and some tricks in materials let a world's light in and keep the patches' light
+out. They show as a difference between the pictures, whether this module knows of them or not.
 """
 
 from __future__ import annotations
@@ -14,47 +14,35 @@ from numpy.typing import NDArray
 from ...core.capture.agreement import DIFFERENT, SUSPECTED, Agreement, Caution, agreement
 from ...core.capture.names import combined
 from ...core.hemicube import Hemicube
-from ...core.light.environment import Environment, directions, sample_directions
 from ...core.patterns import pattern_set
 from ..blender.reached import gives, reached
 from ..stage.small import parts_of, small
 from ..stage.stage import Stage
 from ..work import Steps, Warned
-from ..world.lamp_render import world_showing
 from . import planes
+from .look import Looked, own_bounces, white_world
 
 SAMPLES = 48
-# Rows of the white world's map, which is black where the hemicube has no patch.
-HEIGHT = 256
 
 
-def check_light(on: Stage, hemicube: Hemicube) -> Steps[tuple[bool, Caution | None]]:
+def check_light(
+    on: Stage, hemicube: Hemicube, looked: Looked | None = None
+) -> Steps[tuple[bool, Caution | None]]:
     """Compare the light of the prepared stage's patches with a white world's.
 
     -> (whether the patches must be sampled, a `Caution` or None). Some light reaches the picture by
     shadow rays alone. Patches must then be sampled: Cycles casts shadow rays at them. The caution
-    says what this costs. The stage is left as it was. Raises CancelledError.
+    says what this costs. looked: pictures of the stage, where there are some. The stage is left as
+    it was. Raises CancelledError.
     """
-    seed = on.scene.cycles.seed
-    black, through = on.scene.world, on.scene.cycles.transparent_max_bounces
     with small(on, SAMPLES):
-        own = combined((yield from parts_of(on, "looking at the scene's own light")))[..., :3]
-        found = yield from _of_patches(on, hemicube, own, sampled=False)
-        expected = []
-        try:
-            on.scene.world = _white(on, hemicube)
+        if looked:
+            own, found, truth = looked.own, looked.patches, looked.white
+        else:
+            own = combined((yield from parts_of(on, "looking at the scene's own light")))[..., :3]
+            found = yield from _of_patches(on, hemicube, own, sampled=False)
             # light passes as many transparent surfaces as in the artist's render
-            asked = on.changed.get("cycles.transparent_max_bounces", [through])[0]
-            on.scene.cycles.transparent_max_bounces = asked
-            for i in (1, 2):
-                on.scene.cycles.seed = seed + i
-                parts = yield from parts_of(on, "looking at the light of a white world")
-                expected.append(combined(parts)[..., :3])
-        finally:
-            on.scene.world = black
-            on.scene.cycles.seed = seed
-            on.scene.cycles.transparent_max_bounces = through
-        truth = np.stack(expected)
+            truth = yield from _whites(on, hemicube, own_bounces(on), "a white world")
         tricked = _tricks_shadows()
         different = SUSPECTED if tricked else DIFFERENT
         white = on.scene.cycles.film_exposure
@@ -77,6 +65,27 @@ def check_light(on: Stage, hemicube: Hemicube) -> Steps[tuple[bool, Caution | No
     return sampled, Caution(text, seen.ratio, seen.worst, seen.share, seen.dark)
 
 
+def _whites(on: Stage, hemicube: Hemicube, bounces: int, what: str) -> Steps[NDArray]:
+    """Render the stage in a white world, with two seeds -> (2, H, W, 3).
+
+    bounces: how many transparent surfaces light passes; what: is looked at, in words.
+    """
+    scene, found = on.scene, []
+    black, seed, through = scene.world, scene.cycles.seed, scene.cycles.transparent_max_bounces
+    try:
+        scene.world = white_world(on, hemicube)
+        scene.cycles.transparent_max_bounces = bounces
+        for i in (1, 2):
+            scene.cycles.seed = seed + i
+            parts = yield from parts_of(on, f"looking at the light of {what}")
+            found.append(combined(parts)[..., :3])
+    finally:
+        scene.world = black
+        scene.cycles.seed = seed
+        scene.cycles.transparent_max_bounces = through
+    return np.stack(found)
+
+
 def _of_patches(on: Stage, hemicube: Hemicube, own: np.ndarray, sampled: bool) -> Steps[NDArray]:
     """Render the picture in the light of all patches and the scene's own lights, (H, W, 3)."""
     total = own
@@ -90,35 +99,15 @@ def _of_patches(on: Stage, hemicube: Hemicube, own: np.ndarray, sampled: bool) -
     return total
 
 
-def _white(on: Stage, hemicube: Hemicube) -> bpy.types.World:
-    """A white world, black in directions where no patch is.
-
-    The world shows a map, though it has one colour: Cycles does not sample an even colour as a
-    light, so that such a world would have the same faults as the patches.
-    """
-    azimuth, latitude, _ = sample_directions(HEIGHT, 2 * HEIGHT, 1)
-    there = hemicube.locate(directions(azimuth, latitude))[0] >= 0
-    return world_showing(
-        on, Environment(np.repeat(there[..., None], 3, axis=-1).astype(np.float32))
-    )
-
-
 def _through_more(on: Stage, hemicube: Hemicube, found: np.ndarray, own: np.ndarray) -> Steps[bool]:
     """Find out whether the scene's own limit of transparent bounces makes the difference -> bool.
 
     The patches' light passes more surfaces than that limit, as the patches are transparent too. So
     a white world is rendered once more without the limit.
     """
-    black, seed, renders = on.scene.world, on.scene.cycles.seed, []
-    try:
-        on.scene.world = _white(on, hemicube)
-        for i in (1, 2):
-            on.scene.cycles.seed = seed + i
-            parts = yield from parts_of(on, "looking at how light passes transparent surfaces")
-            renders.append(combined(parts)[..., :3])
-    finally:
-        on.scene.world, on.scene.cycles.seed = black, seed
-    return agreement(found, np.stack(renders), own, white=on.scene.cycles.film_exposure).agrees
+    through = on.scene.cycles.transparent_max_bounces
+    more = yield from _whites(on, hemicube, through, "a white world through more surfaces")
+    return agreement(found, more, own, white=on.scene.cycles.film_exposure).agrees
 
 
 def _words(on: Stage, seen: Agreement, deep: bool = False) -> str:

@@ -128,8 +128,10 @@ def lit(
     own: bool = False,
     radiance: float = 1.0,
     portals: bool = False,
-) -> Iterator[None]:
+) -> Iterator[str]:
     """Put the planes of some images around the stage, with light groups, for as long as it is open.
+
+    Yields how the names of the light groups begin.
 
     sampled: whether Cycles also casts shadow rays at the patches, as it does at a world; it can do
     so for at most `MOST_SAMPLED` images. own: whether the artist's light groups are written too.
@@ -174,7 +176,7 @@ def lit(
                 layer.lightgroups.add(name=name)
         for plane in planes:
             layer.lightgroups.add(name=plane.lightgroup)
-        yield
+        yield mark
     finally:
         layer.material_override = override
         while layer.lightgroups:

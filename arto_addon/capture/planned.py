@@ -9,11 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
+from numpy.typing import NDArray
 
 from ...core.capture.agreement import Caution
 from ...core.capture.kinds import Keep, Route
 from ...core.capture.names import GRAIN
 from ...core.capture.refine import check as can_refine
+from ...core.capture.refine import refine
 from ...core.errors import ArtoError, SceneError
 from ...core.fit.choice import check as check_choice
 from ...core.hemicube import Hemicube
@@ -24,11 +26,11 @@ from ..stage.settings import samples_of
 from ..stage.stage import Pace, Stage, picture_region
 from ..stage.takes import TAKES
 from ..work import Progress, Steps
-from . import planes, room
+from . import planes, probe, room
 from .light_check import check_light
+from .look import SAMPLES, look
 from .patterns import patterns_of
 from .plan import kept_often, render_plan, strips_of, tiles_of
-from .probe import refined
 from .room import Estimate
 
 # How many times more patches than the grid has the probe may ask for.
@@ -87,9 +89,9 @@ def planned(
     else:
         if settings.adaptive:
             can_refine(hemicube)  # before anything is rendered
-        route, caution = yield from light_route(on, hemicube)
-        if settings.adaptive and route != Route.SAMPLED:
-            hemicube = yield from refined(on, hemicube, ADAPTIVE_SHARE * len(hemicube))
+        route, caution, probed = yield from looked_at(on, hemicube)
+        if probed is not None:
+            hemicube = refine(hemicube, probed, SAMPLES, ADAPTIVE_SHARE * len(hemicube))
     patterns = patterns_of(settings, route)
     if route == Route.SAMPLED and isinstance(patterns, LobedSet):
         # a patch that is hidden from diffuse rays lights nothing diffuse by shadow rays
@@ -123,19 +125,33 @@ def planned(
         check_choice(settings.support, patterns, settings.separate)
         tiles, estimate = estimated(kept)
     yield Progress(0.0, f"this capture: {estimate.line}")
+    if on.is_kept and room.lacks_memory(estimate.memory):
+        on.let_go()
+        yield Progress(0.0, "memory is short: Cycles prepares the scene again for each render")
     room.check_memory(estimate.memory, "this capture")
     room.check_disk(folder, estimate.disk, "this capture")
     return Planned(hemicube, patterns, route, grain, kept, caution, tiles, estimate)
 
 
-def light_route(on: Stage, hemicube: Hemicube) -> Steps[tuple[Route, Caution | None]]:
-    """Choose how light gets to the patches -> (route, the `Caution` of `check_light` or None)."""
+def looked_at(on: Stage, hemicube: Hemicube) -> Steps[tuple[Route, Caution | None, NDArray | None]]:
+    """Choose how light gets to the patches -> (route, the `Caution` of `check_light`, the probe).
+
+    The probe is for `refine`; None where the patches are not refined.
+    """
     settings = on.scene.arto
-    if not settings.far:
-        # a near hemicube lights near things more, so a comparison with a world says nothing
-        return Route(settings.route), None
-    sampled, caution = yield from check_light(on, hemicube)
-    return (Route.SAMPLED if sampled else Route(settings.route)), caution
+    route, caution, looked = Route(settings.route), None, None
+    refines = settings.adaptive and route != Route.SAMPLED
+    # A near hemicube lights near things more, so a comparison with a world says nothing.
+    if settings.far:
+        # What Ray Portals show of the patches is not in the comparison, and is in the probe.
+        if refines and not on.portals:
+            looked = yield from look(on, hemicube)
+        sampled, caution = yield from check_light(on, hemicube, looked)
+        route = Route.SAMPLED if sampled else route
+    if not refines or route == Route.SAMPLED:
+        return route, caution, None
+    found = looked.probe if looked else (yield from probe.probed(on, hemicube))
+    return route, caution, found
 
 
 def room_for(scene: bpy.types.Scene, given: Given) -> Estimate:

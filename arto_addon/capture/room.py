@@ -140,6 +140,12 @@ def free_disk(folder: Path) -> int:
     )
 
 
+def lacks_memory(needed: int) -> bool:
+    """Whether the machine has not that much memory free."""
+    _, free = memory()
+    return free is not None and free < needed
+
+
 def check_memory(needed: int, what: str) -> None:
     """Raise SceneError where the machine has not that much memory free."""
     _, free = memory()

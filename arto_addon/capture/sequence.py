@@ -24,12 +24,13 @@ from ..stage.settings import prepare
 from ..stage.stage import stage
 from ..stage.takes import TAKES, WHOLE, take
 from ..work import PLAIN, Batch, Progress, Steps, attempted, looked, of_piece, part_of, strictly
-from . import planes, probe, room
+from . import planes, room
 from .behind import portals_seen
 from .capture import capture
 from .check import check_patterns, check_place, check_scene
+from .look import SAMPLES
 from .patterns import patterns_of
-from .planned import ADAPTIVE_SHARE, Given, light_route, room_for
+from .planned import ADAPTIVE_SHARE, Given, looked_at, room_for
 
 
 @contextmanager
@@ -134,15 +135,14 @@ def together(scene: bpy.types.Scene, view_layer: str, frames: Sequence[int]) -> 
         with stage(scene, view_layer) as on, take(there := rendered(on), WHOLE):
             prepare(on, layers=len(patterns_of(settings)) + settings.grain)
             on.portals = portals_seen(on, there)
-            here, told = yield from light_route(on, hemicube)
+            here, told, found = yield from looked_at(on, hemicube)
             route = Route.SAMPLED if here == Route.SAMPLED else route
             caution = caution or told
-            if settings.adaptive and route != Route.SAMPLED:
-                found = yield from probe.probed(on, hemicube)
+            if found is not None:
                 probes.append(found.reshape(len(found), 1, -1, 3))
             pace = on.pace or pace
     if probes and route != Route.SAMPLED:
         every = np.concatenate(probes, axis=2)
         most = ADAPTIVE_SHARE * len(hemicube)
-        hemicube = refine(hemicube, every, probe.SAMPLES, most)
+        hemicube = refine(hemicube, every, SAMPLES, most)
     return Given(hemicube, route, caution, pace)

@@ -23,7 +23,7 @@ from ...core.fit.fit import fit_into
 from ..blender.output import write_to
 from ..capture import room
 from ..capture.asked import Asked, asked
-from ..capture.capture import plan_of, render_tile, set_tile
+from ..capture.capture import Around, plan_of, render_tile
 from ..capture.check import check_scene
 from ..capture.planned import Given
 from ..capture.stream import Stream
@@ -57,8 +57,11 @@ def render_part(job_folder: Path, number: int) -> Steps[Path]:
     try:
         # a folder with a unique name: a farm may have given the part to two machines
         partial = marked.scratch(folder, "part")
-        with _on_stage(job, part, captured) as this:
-            files = yield from render_tile(this.on, captured.head, part.tile, partial)
+        with (
+            _on_stage(job, part, captured) as this,
+            Around(this.on, captured.head) as around,
+        ):
+            files = yield from render_tile(this.on, captured.head, part.tile, partial, around)
         entry = None
         if fitted:
             entry = yield from _fitted(captured, part, partial, files)
@@ -114,11 +117,13 @@ def save_part(job_folder: Path, number: int) -> Steps[Path]:
                     f"but {part.name} needs it otherwise, as there are shadow catchers: render "
                     "that part with ARTO, or make the object local and plan again"
                 )
+        this.on.let_go()
         for i, images in enumerate(plan_of(captured.head)):
             yield Progress(i / len(plan_of(captured.head)), f"saving {part.name}")
             path = job.folder / "parts" / f"{part.name}_{i:02d}.blend"
             path.parent.mkdir(parents=True, exist_ok=True)
-            with set_tile(this.on, captured.head, part.tile, images):
+            with Around(this.on, captured.head) as around:
+                around.set_tile(part.tile, images)
                 write_to(this.on.scene.render, Path(f"//{part.name}_{i:02d}_####.exr"))
                 # by which a gathering knows of what the picture is, whatever its name
                 this.on.scene.render.use_stamp_note = True

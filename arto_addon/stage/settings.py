@@ -61,7 +61,6 @@ CHANGES = (
         "cycles.film_transparent_glass", False, "it would let the patches through as well",
         "Your render shows the film through glass; the relit picture shows the world",
     ),
-    Change("render.use_persistent_data", False, "a copy of a scene has none"),
 )  # fmt: skip
 
 
@@ -79,6 +78,7 @@ def prepare(on: Stage, layers: int) -> None:
     layer = on.scene.view_layers[0]
     layer.cycles.denoising_store_passes = True
     layer.use_pass_z = True
+    on.keep_prepared()
     world = on.made(dark_world(on.scene.world, "ARTO Black"))
     on.changed["world"] = [on.scene.world.name if on.scene.world else None, None]
     on.scene.world = world

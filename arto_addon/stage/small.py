@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import bpy
+import numpy as np
 from numpy.typing import NDArray
 
 from ...core import exr
@@ -45,23 +46,24 @@ def small(on: Stage, samples: int) -> Iterator[None]:
 
 
 def parts_of(
-    on: Stage, text: str, share: float = 0.0, span: float = 0.0
+    on: Stage, text: str, share: float = 0.0, span: float = 0.0, only: str = ""
 ) -> Steps[dict[str, NDArray]]:
     """Render the stage as it stands -> the render's parts by name, as `exr.read` gives them.
 
     share: how much of the whole work was done before, 0 to 1; span: how much of the whole work this
-    render is. Raises CancelledError.
+    render is; only: how the names of the wanted parts end. Raises CancelledError.
     """
     with temporary() as folder:
         path = folder / "small.exr"
         write_to(on.scene.render, path)
         request = Render(on.scene.name, share, text, span)
+        on.about_to_render()
         with _timed() as laps:
             yield request
         request.check()
-        found: dict[str, NDArray] = exr.read(path)
-        on.pace = laps.pace(on, len(found))
-        return found
+        with exr.Layers(path) as there:
+            on.pace = laps.pace(on, len(there.names))
+            return {n: np.array(there.read(n)) for n in there.names if n.endswith(only)}
 
 
 class _Laps:

@@ -51,6 +51,7 @@ class Stage:
         self.portals: bool | None = None
         self.own_groups: list[str] = []  # The artist's light groups that have objects.
         self._made: list[bpy.types.ID] = []
+        self._longest = 0  # The most samples that the scene which Cycles keeps was rendered with.
 
     def made(self, block: _Block) -> _Block:
         """Note a new data-block, so that it goes when the stage goes."""
@@ -74,7 +75,38 @@ class Stage:
             setattr(target, name, value)
             self.changed[path] = [before, value]
 
+    def keep_prepared(self) -> None:
+        """Let Cycles keep the scene that it has prepared, from one render of the stage to the next.
+
+        Cycles then reads only what has changed since. It builds its tree of all triangles again
+        where an object was added, removed or changed. The memory is free again when the stage goes.
+        """
+        self.scene.render.use_persistent_data = True
+
+    def about_to_render(self) -> None:
+        """Note that a render begins.
+
+        A scene that Cycles kept goes on with the sequence of its longest render. Where a render has
+        fewer samples, Cycles prepares the scene again: its noise is then that of such a render.
+        """
+        samples = self.scene.cycles.samples
+        if self.is_kept and samples < self._longest:
+            self.let_go()
+            self.keep_prepared()
+            self._longest = 0
+        self._longest = max(self._longest, samples)
+
+    def let_go(self) -> None:
+        """Free the scene that Cycles has prepared. The next render prepares it again."""
+        self.scene.render.use_persistent_data = False
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether Cycles keeps the scene that it has prepared."""
+        return bool(self.scene.render.use_persistent_data)
+
     def clear(self) -> None:
+        self.let_go()
         bpy.data.batch_remove([*self._made, self.scene])
 
 
@@ -146,6 +178,7 @@ def stage(scene: bpy.types.Scene, view_layer: str) -> Iterator[Stage]:
         while layer.lightgroups:
             layer.lightgroups.remove(layer.lightgroups[0])
         copy.render.use_compositing = False
+        out.let_go()
         float_exr(copy.render)
         yield out
     finally:

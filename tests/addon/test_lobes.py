@@ -82,9 +82,9 @@ def test_lobes_are_refused_where_light_comes_by_shadow_rays_alone(tmp_path, monk
 
     def by_shadow_rays(*_: object):
         yield from ()
-        return Route.SAMPLED, None
+        return Route.SAMPLED, None, None
 
-    monkeypatch.setattr(planned, "light_route", by_shadow_rays)
+    monkeypatch.setattr(planned, "looked_at", by_shadow_rays)
     with pytest.raises(SceneError, match="choose the patterns '1, u, v'"):
         captured(scene)
     # left to the capture, they are those; and what is sampled must not be faint

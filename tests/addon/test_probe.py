@@ -52,10 +52,10 @@ def test_going_on_does_not_probe_again(tmp_path):
                 break
             work.blocking_render(step)
     steps.close()
-    assert [t for t in texts if "probing" in t] and [t for t in texts if "looking at" in t]
+    assert [t for t in texts if "looking at" in t]
     again = []
     work.run(capture.capture(scene, scene.view_layers[0].name), again.append)
-    assert not [s for s in again if "probing" in s.text or "looking at" in s.text]
+    assert not [s for s in again if "looking at" in s.text]
 
 
 def test_half_sides_cannot_be_refined_and_the_paper_does_not_try(tmp_path):

@@ -1,0 +1,33 @@
+"""Cycles prepares the scene once for the looks of a capture, and once for all its tiles."""
+
+from __future__ import annotations
+
+import numpy as np
+from arto.arto_addon.stage.stage import Stage
+from arto.core import exr
+from arto.core.capture.capture_set import CaptureSet
+from scene_tools import captured, small_scene
+
+from bench.heavy import counted
+
+
+def layers(taken: CaptureSet) -> list[np.ndarray]:
+    """All layers of all tiles."""
+    names = [taken.folder / name for tile in taken.head.tiles for name in tile.files]
+    return [pixels for name in names for pixels in exr.read(name).values()]
+
+
+def test_a_capture_in_tiles_is_prepared_twice_and_is_the_same_to_the_bit(tmp_path, monkeypatch):
+    scene = small_scene(tmp_path)
+    scene.arto.memory, scene.arto.samples, scene.arto.adaptive = 1, 48, True
+    with counted() as kept:
+        kept_layers = layers(captured(scene))
+    assert kept.renders >= 3 + 2  # a look at the patches, two at a white world, and the tiles
+    assert kept.prepared_times == 2
+    monkeypatch.setattr(Stage, "keep_prepared", lambda _: None)
+    scene.arto.folder = str(tmp_path / "anew")
+    with counted() as anew:
+        layers_anew = layers(captured(scene))
+    assert anew.prepared_times == anew.renders == kept.renders
+    for one, other in zip(kept_layers, layers_anew, strict=True):
+        np.testing.assert_array_equal(one, other)
