@@ -56,6 +56,16 @@ class Settings:
     active_own_group: int
     groups: Groups
     active_group: int
+    match_target: str
+    match_image: Any
+    match_mask: Any
+    match_keep: Any
+    match_change: Literal["LIGHT", "GAINS", "TURN"]
+    match_colours: bool
+    match_own: bool
+    match_near: float
+    match_exposure: bool
+    match_balance: bool
     folder: str
     scene_id: str
     alone: str

@@ -12,6 +12,7 @@ import bpy
 from ..capture.capture import capture
 from ..capture.sequence import capture_frames
 from ..fit.fit import fit
+from ..match.match import even_out, match_target
 from ..plate.composite import save_composite
 from ..plate.verify import verify_plate
 from ..relight.looks import relight_looks
@@ -30,6 +31,8 @@ Verb = Literal[
     "relight_looks",
     "verify",
     "composite",
+    "match",
+    "even_out",
 ]
 
 
@@ -73,4 +76,6 @@ VERBS: Mapping[Verb, Work] = {
     "relight_looks": Work(_relight_looks, "relighting the looks of"),
     "verify": Work(verify_plate, "verifying the plate of"),
     "composite": Work(save_composite, "compositing"),
+    "match": Work(match_target, "looking for the light of"),
+    "even_out": Work(even_out, "looking for even light on"),
 }

@@ -99,7 +99,9 @@ def mix_to_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> Path:
     image += whole.image * np.maximum(left, 0)[..., None] * np.float32(2.0**mix.exposure)
     exr.write(world_exr, {"": image}, {PLATE: path.name}, working_space())
     _gain_lamps(scene, mix)
-    scene.world = _world_showing(world_exr, whole.turn)
+    world = bpy.data.worlds.get(WORLD) or new_world(WORLD)
+    show_map(world, world_exr, whole.turn)
+    scene.world = world
     scene.view_layers[layer].world_override = None
     return world_exr
 
@@ -142,9 +144,8 @@ def _gain_lamps(scene: bpy.types.Scene, mix: Mix) -> None:
                 lamp.color = np.array(lamp.color[:]) * (gain / most)
 
 
-def _world_showing(path: Path, turn: float) -> bpy.types.World:
-    """A world that shows a map from a file. turn: about the vertical, in radians."""
-    world = bpy.data.worlds.get(WORLD) or new_world(WORLD)
+def show_map(world: bpy.types.World, path: Path, turn: float = 0.0) -> None:
+    """Give a world the nodes that show a map from a file. turn: about the vertical, in radians."""
     tree = world.node_tree
     tree.nodes.clear()
     image = bpy.data.images.load(str(path), check_existing=True)
@@ -161,4 +162,3 @@ def _world_showing(path: Path, turn: float) -> bpy.types.World:
     tree.links.new(mapping.outputs[0], texture.inputs["Vector"])
     tree.links.new(texture.outputs["Color"], light.inputs["Color"])
     tree.links.new(light.outputs[0], out.inputs["Surface"])
-    return world

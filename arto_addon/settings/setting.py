@@ -16,9 +16,9 @@ from typing import Literal
 Kind = Literal["switch", "whole", "number", "text", "choice", "choices", "image", "list"]
 # The piece of work that reads a setting. hemicube: a capture, to build its hemicube; shot: all
 # work, to find the shot's files.
-Work = Literal["hemicube", "capture", "fit", "relight", "shot"]
+Work = Literal["hemicube", "capture", "fit", "relight", "match", "shot"]
 # Titles of the panels, see `ui.panels`.
-Panel = Literal["Shot", "Light", "Result", "Quality", "Layers", "Storage", "Method"]
+Panel = Literal["Shot", "Light", "Result", "Match", "Quality", "Layers", "Storage", "Method"]
 # Identifier, name, description.
 Item = tuple[str, str, str]
 

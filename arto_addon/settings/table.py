@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from .of_capture import CAPTURE, FIT, HEMICUBE
+from .of_match import MATCH
 from .of_relight import FILES, LIGHT
 from .of_window import SHOWN
 from .setting import Decides, Panel, Setting, Work
@@ -54,7 +55,7 @@ SHOT = (
     ),
 )
 # This order is the order of the command line's options, and of the settings in a farm's job.
-SETTINGS = (*HEMICUBE, *CAPTURE, *FIT, *LIGHT, *FILES, *SHOWN, *SHOT)
+SETTINGS = (*HEMICUBE, *CAPTURE, *FIT, *LIGHT, *FILES, *SHOWN, *MATCH, *SHOT)
 # The settings that a capture on a farm reads, for its renders, its fit and the denoising of its
 # guides. Paths on a machine are not among them. Setting the preset also sets the faces, and setting
 # the samples also sets the quality. So the preset and the samples come before what they set.

@@ -27,6 +27,7 @@ from ..farm.plan import plan
 from ..fit.fit import fit
 from ..job import run as job
 from ..live import maps
+from ..match.apply import match_and_apply
 from ..relight.many import relight_frames, relight_many
 from ..relight.relight import relight
 from ..shot import home, paths, scene_id
@@ -98,6 +99,9 @@ def _do(verb: str, options: dict[str, Any], report: Report) -> None:
         _of_a_farm(verb, options, report, batch)
         return
     scene, layer = _scene(options)
+    if verb == "match":
+        _match(scene, layer, options, report, batch)
+        return
     source, saves = options.pop("source", None), options.pop("save", False)
     if saves:
         _save(scene, layer, options.get("folder"))
@@ -133,6 +137,30 @@ def _do(verb: str, options: dict[str, Any], report: Report) -> None:
     run(_as_asked(work, batch, many), report)
     if verb == "capture" and named is None:
         _say_unsaved(verb, paths.place(scene, layer).folder)
+
+
+def _match(
+    scene: bpy.types.Scene, layer: str, options: dict[str, Any], report: Report, batch: Batch
+) -> None:
+    """Find the light of a picture, and make a look of it. Raises ArtoError, OptionError."""
+    options["match_target"] = str(options.pop("target").resolve())
+    images = {"match_mask": options.pop("mask"), "match_keep": options.pop("keep")}
+    saves = options.pop("save")
+    if saves and not home.file():
+        raise SceneError("this .blend was never saved, so --save has no place for it: save it")
+    _set(scene, options)
+    for name, path in images.items():
+        if path is None:
+            continue
+        try:
+            image = bpy.data.images.load(str(path.resolve()), check_existing=True)
+        except RuntimeError as e:
+            raise OptionError(f"{path} cannot be read ({e})") from e
+        setattr(scene.arto, name, image)
+    work: Steps[object] = match_and_apply(scene, layer)
+    run(_as_asked(work, batch, False), report)
+    if saves:
+        _save_blend()
 
 
 def _say_unsaved(verb: str, folder: Path) -> None:

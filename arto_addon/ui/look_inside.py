@@ -42,7 +42,14 @@ def under(context: bpy.types.Context, event: bpy.types.Event) -> tuple[Editor, f
     return None
 
 
-class _Picking(Quick):
+def show_relit_picture(scene: bpy.types.Scene) -> None:
+    """Show the plate, where no picture of the shot is shown that could be clicked into."""
+    showing = {e.image.name for e in editors() if e.image}
+    if not showing & {name_of(scene), LIVE, inside.FROM}:
+        bpy.ops.arto.show_plate()
+
+
+class Picking(Quick):
     """An operator that waits for a click into a picture."""
 
     hint = ""
@@ -106,7 +113,7 @@ class _Picking(Quick):
         self._leave(context)
 
 
-class ARTO_OT_look_inside(_Picking):
+class ARTO_OT_look_inside(Picking):
     """Click a pixel of the relit picture: shows where its light comes from, on the unfolded \
 patches with the HDRI on them"""
 
@@ -115,10 +122,7 @@ patches with the HDRI on them"""
     hint = "Click a pixel of the relit picture"
 
     def begin(self, context: bpy.types.Context) -> None:
-        scene = context.scene
-        showing = {e.image.name for e in editors() if e.image}
-        if not showing & {name_of(scene), LIVE, inside.FROM}:
-            bpy.ops.arto.show_plate()
+        show_relit_picture(context.scene)
 
     def picked(self, context: bpy.types.Context, editor: Editor, u: float, v: float) -> str:
         if editor.space.image.name in {inside.IMAGE, compare.IMAGE}:
@@ -131,7 +135,7 @@ patches with the HDRI on them"""
         return "\n".join(found.lines)
 
 
-class ARTO_OT_light_from(_Picking):
+class ARTO_OT_light_from(Picking):
     """Click a place of the HDRI, or of the unfolded patches: the picture shows what the light \
 from there gives to it"""
 

@@ -34,12 +34,15 @@ def parser() -> argparse.ArgumentParser:
         ("capture", "render the basis images", table.options("hemicube", "capture")),
         ("fit", "fit the reflectance field", table.options("fit")),
         ("relight", "relight with the scene's world", table.options("relight")),
+        ("match", "find the light of a picture", table.options("match")),
         ("plan", "plan a capture by many machines", table.options("hemicube", "capture", "fit")),
     ):
         one = jobs.add_parser(name, parents=[files, told], help=text)
         for setting in settings:
             _add_option(one, setting)
-        if name != "fit":
+        if name == "match":
+            _add_match(one)
+        elif name != "fit":
             _add_frames(one, "first and last frame, and a step: 1-24, 1-100:5 (a field for each, "
                         "or a picture)")  # fmt: skip
         if name == "capture":
@@ -131,6 +134,13 @@ def _add_light(one: argparse.ArgumentParser) -> None:
     one.add_argument(
         "--hdri", type=Path, metavar="EXR", help="write the world's light, with a kit or without"
     )
+
+
+def _add_match(one: argparse.ArgumentParser) -> None:
+    one.add_argument("target", type=Path, help="the picture that the shot is to look like")
+    one.add_argument("--mask", type=Path, help="a picture that is white where the target counts")
+    one.add_argument("--keep", type=Path, help="a picture that is white where the shot stays")
+    one.add_argument("--save", action="store_true", help="save the .blend with the light as a look")
 
 
 def _add_adopt(one: argparse.ArgumentParser) -> None:

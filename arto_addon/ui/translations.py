@@ -34,6 +34,23 @@ Compare | Vergleichen | 比較
 Look Inside | Hineinsehen | 内部を見る
 Light from Here | Licht von hier | ここからの光
 Verify | Prüfen | 検証
+As in a Picture | Wie auf einem Bild | 写真のように
+Match | Angleichen | マッチ
+Even Out | Ausgleichen | 均一にする
+Where From | Woher | どこから
+What No Light Makes | Was kein Licht macht | どの光でも作れない部分
+Do not count of the target | Zählt beim Ziel nicht | ターゲットで無視するもの
+Target | Ziel | ターゲット
+Target Image | Zielbild | ターゲット画像
+Mask | Maske | マスク
+Keep | Behalten | 維持
+Change | Ändern | 変更
+All Light | Alles Licht | すべての光
+Strengths | Stärken | 強さ
+Colours Too | Auch Farben | 色も
+Scene Lamps Too | Auch Lampen der Szene | シーンのランプも
+Near | Nah | 近さ
+White Balance | Weißabgleich | ホワイトバランス
 Save Composite | Composite speichern | 合成を保存
 Open HDRI | HDRI öffnen | HDRIを開く
 Use This HDRI | Dieses HDRI verwenden | このHDRIを使う

@@ -14,6 +14,8 @@ from ..job.session import SecondBlender
 from ..job.verbs import Verb
 from ..live import live
 from ..live.image import put_away
+from ..match import apply
+from ..match.found import match_file
 from ..plate import compare
 from ..plate.names import relit_file
 from ..plate.plate import name_of, show
@@ -94,8 +96,21 @@ def show_verified(job: SecondBlender) -> str:
     return job.state.text
 
 
+def show_matched(job: SecondBlender) -> str:
+    """Make the look that a match has found, and show the shot in it."""
+    scene = _scene_of(job)
+    path = Path(job.state.result)
+    if scene is None or path != match_file(relit_file(scene)):
+        return job.state.text
+    window = bpy.context.window_manager.windows[0]
+    with bpy.context.temp_override(window=window):
+        found = apply.apply(scene, path)
+        bpy.ops.ed.undo_push(message="ARTO Match")
+    return found.words
+
+
 # Images that only the window needs: they are removed before the file is saved.
-OURS = (inside.IMAGE, inside.FROM, compare.IMAGE)
+OURS = (inside.IMAGE, inside.FROM, compare.IMAGE, apply.IMAGE)
 
 
 @persistent
@@ -123,6 +138,8 @@ _FINISHERS: dict[Verb, Callable[[SecondBlender], str]] = {
     "shoot": show_captured,
     "fit": show_captured,
     "verify": show_verified,
+    "match": show_matched,
+    "even_out": show_matched,
 }
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +60,7 @@ class Answers:
 
     @staticmethod
     def of(preview: Preview, most: int = MOST) -> Answers:
-        """Compute the matrix of a shot. Of a shot with shadow catchers it is that of everything.
+        """Compute the matrix of a shot; of a shot with shadow catchers, that of its things.
 
         Parameters
         ----------
@@ -80,10 +80,10 @@ class Answers:
         height, width = preview.takes[0].shape
         enough = [f for f in preview.factors if height * width <= PIXELS * f * f]
         factor = min(enough, default=max(preview.factors))
-        small = preview.level(factor)[0]
+        small = preview.level(factor)[-1]
         fine, finer, shiny = small, factor, np.empty(0, np.intp)
         for other in sorted((f for f in preview.factors if f < factor), reverse=True):
-            field = preview.level(other)[0]
+            field = preview.level(other)[-1]
             found = np.flatnonzero(_shares_of_narrow(field) > SHINY)
             if len(found) > FINE_PIXELS:
                 break
@@ -95,6 +95,32 @@ class Answers:
             values = np.concatenate([values, answers(fine, cells, shiny)], axis=-1)
             alpha = np.concatenate([alpha, fine.layer("alpha").ravel()[shiny]])
         return Answers(cells, values, small, fine, (factor, finer), shiny, alpha.astype(np.float64))
+
+    def refined(self, sides: NDArray[np.intp]) -> Answers:
+        """Cut patches into more cells.
+
+        Parameters
+        ----------
+        sides : (K,) int
+            Cells a side of each patch.
+
+        Returns
+        -------
+        Answers
+            Patches that are cut as before keep their columns.
+        """
+        old, cells = self.cells, Cells(self.cells.hemicube, sides)
+        changed = np.flatnonzero(sides != old.sides)
+        values = np.empty((3, cells.count, self.values.shape[-1]), np.float32)
+        of_old = np.repeat(sides == old.sides, old.sides**2)
+        of_new = np.repeat(sides == old.sides, sides**2)
+        values[:, of_new] = self.values[:, of_old]
+        new = answers(self.small, cells, None, changed)
+        if len(self.shiny):
+            fine = answers(self.fine, cells, self.shiny, changed)
+            new = np.concatenate([new, fine], axis=-1)
+        values[:, ~of_new] = new[:, ~of_new]
+        return replace(self, cells=cells, values=values)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -194,7 +220,10 @@ class Answers:
 
 
 def answers(
-    field: Field, cells: Cells, pixels: NDArray[np.intp] | None = None
+    field: Field,
+    cells: Cells,
+    pixels: NDArray[np.intp] | None = None,
+    patches: NDArray[np.intp] | None = None,
 ) -> NDArray[np.float32]:
     """Compute the picture that each cell makes when it alone shines, with radiance 1.
 
@@ -205,6 +234,8 @@ def answers(
     cells : Cells
     pixels : (n,) int, optional
         The pixels, row by row of the picture; all by default.
+    patches : (k,) int, optional
+        The patches whose cells shine; all by default. The rows of others are 0.
 
     Returns
     -------
@@ -223,6 +254,10 @@ def answers(
         column[:] = -1
         column[pixels] = np.arange(len(pixels))
     out = np.zeros((3, cells.count, height * width if pixels is None else len(pixels)), np.float32)
+    lit = np.ones(len(cells.sides), bool)
+    if patches is not None:
+        lit[:] = False
+        lit[patches] = True
     lights = list(cells.lights())
     for light in lights:
         light.polynomial((0,))  # what all threads share is worked out before they start
@@ -231,7 +266,7 @@ def answers(
         places = column[_places(tile, width)]
         with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
             jobs = [
-                pool.submit(_add_block, out, tile, block, places, cells, lights)
+                pool.submit(_add_block, out, tile, block, places, cells, lights, lit)
                 for block in range(len(tile.blocks))
             ]
             for job in jobs:
@@ -272,14 +307,18 @@ def _add_block(
     places: NDArray[np.intp],
     cells: Cells,
     lights: list[PatchLight],
+    lit: NDArray[np.bool_],
 ) -> None:
-    """Add the answers of a block. places: where the tile's pixels are in `out`, -1 for nowhere."""
+    """Add the answers of a block. places: where the tile's pixels are in `out`, -1 for nowhere.
+
+    lit: (K,), the patches whose cells shine.
+    """
     where = tile.blocks[block]
     ones, mine = tile.ones(where).T, places[where]
     if (mine < 0).all():
         return
     for model in tile.models:
-        for k in np.flatnonzero(model.counts[block]).tolist():
+        for k in np.flatnonzero((model.counts[block] > 0) & lit).tolist():
             at, pixels = model.at(block, k), model.pixels(block, k)
             some = np.flatnonzero(mine[pixels] >= 0)
             if not len(some):
@@ -293,11 +332,16 @@ def _add_block(
                 for i in range(min(3, count - 3 * t)):
                     for c in range(3):
                         out[c, first + 3 * t + i][to] += reflects[c] * found[i]
-    _add_rest(out, tile, where, mine, cells)
+    _add_rest(out, tile, where, mine, cells, lit)
 
 
 def _add_rest(
-    out: NDArray[np.float32], tile: Tile, where: slice, mine: NDArray[np.intp], cells: Cells
+    out: NDArray[np.float32],
+    tile: Tile,
+    where: slice,
+    mine: NDArray[np.intp],
+    cells: Cells,
+    lit: NDArray[np.bool_],
 ) -> None:
     """Add what was too small to be an entry, see `Tile.rest`: it sees patches evenly."""
     weights = tile.rest_weights
@@ -309,7 +353,7 @@ def _add_rest(
     np.divide(share, total, out=share, where=total > 0)
     rest = tile.rest(where).T
     whole = np.add.reduceat(cells.solid_angles, cells.starts[:-1])
-    for k in np.flatnonzero(bits.any(axis=1)).tolist():
+    for k in np.flatnonzero(bits.any(axis=1) & lit).tolist():
         there = np.flatnonzero(bits[k].astype(bool) & (mine >= 0))
         light = share[k, there] * rest[:, there]
         for j in range(int(cells.starts[k]), int(cells.starts[k + 1])):

@@ -45,12 +45,15 @@ class Wish:
         Whether each light's colour may change, or its strength alone.
     exposure, balance : bool
         Whether the target may be brighter as a whole, and in each colour by itself.
+    grey : frozenset of str
+        The lights whose strength alone may change, whatever `colours` says.
     """
 
     near: float = 0.0
     colours: bool = False
     exposure: bool = False
     balance: bool = False
+    grey: frozenset[str] = frozenset()
 
 
 def solved(
@@ -91,12 +94,13 @@ def solved(
         pictures.append(fixed[used])
     else:
         kept = fixed[used]
-    relative, wanted = asked.relative()[used], asked.picture[used] - kept
+    wanted, dark = asked.picture[used] - kept, asked.dark
+    relative = asked.relative(every)[used]
     weights = asked.weights[used] / asked.weights[used].sum()
     hold = np.tile(1 / scale if free_scale else np.ones(3), (len(pictures), 1))
     count = len(lights)
     by_colour = np.zeros(len(pictures), bool)
-    by_colour[:count] = wish.colours
+    by_colour[:count] = [wish.colours and name not in wish.grey for name in lights]
     by_colour[count:] = wish.balance
     found = np.ones((len(pictures), 3))
     some = np.ones_like(wanted)
@@ -120,7 +124,9 @@ def solved(
         x = nonnegative(gram, right + (pull + 1e-9) * goal)
         for (i, c), value in zip(columns, x, strict=True):
             found[i, slice(None) if c is None else c] = value
-        off = (np.tensordot(x, basis, 1) - wanted) / relative
+        made = np.tensordot(x, basis, 1)
+        relative = np.maximum(np.maximum(asked.picture[used], made + kept), 0) + dark
+        off = (made - wanted) / relative
         error = float((weights[:, None] * np.abs(off)).sum() / 3)
         some = 1 / np.sqrt(off**2 + ODD**2)
         some /= (weights[:, None] * some).sum() / 3

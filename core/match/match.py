@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..light.environment import Environment
 from ..metrics import mean_relative_error
 from .answers import Answers
+from .cells import Cells
 from .missing import Missing, missing
 from .solve import nonnegative
 from .target import Target
@@ -27,6 +28,9 @@ ROUNDS, ODD = 3, 0.05
 SMOOTH, STEP = 1e-5, 0.3
 # The pull to the present light, from `faithful` to `near`.
 FAITHFUL, NEAR = 1e-5, 1e1
+# A lamp has at least this share of all light, and is so many times brighter than the mean. Its
+# patch is cut into 4 times as many cells a side, up to a number; and the most cells in all.
+LAMP, CONTRAST, FINEST, MOST_FINE = 0.01, 4.0, 16, 1300
 # Rows of the map that is made.
 HEIGHT = 256
 
@@ -141,14 +145,57 @@ def free_light(
     scale = brought(target, shown, exposure, balance)
     target = target.scaled(scale)
     yield 0.1
+    found = yield from _solved(answers, have, target, own, near, 0.1, 0.5)
+    finer = _finer(answers.cells, found)
+    if finer is not None:
+        answers = answers.refined(finer)
+        cells = answers.cells
+        have = cells.radiance(present)
+        found = yield from _solved(answers, have, target, own, near, 0.5, 0.9)
+    environment = cells.environment(found, height, present)
+    return concluded(
+        answers, target, answers.under(environment) + own, shown, scale, environment=environment
+    )
+
+
+def _finer(cells: Cells, radiance: NDArray[np.float64]) -> NDArray[np.intp] | None:
+    """Cut the patches of bright lights more finely -> (K,) cells a side; None where none is one.
+
+    A lamp is smaller than a cell, and its place decides where its shadows and its images are.
+    """
+    light = radiance.sum(axis=-1)
+    flux = light * cells.solid_angles
+    bright = (flux > LAMP * flux.sum()) & (light > CONTRAST * flux.sum() / (4 * np.pi))
+    patch = np.repeat(np.arange(len(cells.sides)), cells.sides**2)
+    order = patch[np.argsort(-flux)]
+    sides = cells.sides.copy()
+    for k in dict.fromkeys(order[bright[np.argsort(-flux)]].tolist()):
+        finer = min(int(sides[k]) * 4, FINEST)
+        if finer > sides[k] and (sides**2).sum() + finer**2 - sides[k] ** 2 <= MOST_FINE:
+            sides[k] = finer
+    return sides if (sides > cells.sides).any() else None
+
+
+def _solved(
+    answers: Answers,
+    have: NDArray[np.float64],
+    target: Target,
+    own: NDArray[np.float64],
+    near: float,
+    first: float,
+    last: float,
+) -> Generator[float, None, NDArray[np.float64]]:
+    """Find the radiance of the cells, (M, 3). first, last: how much is done before and after."""
+    cells = answers.cells
     used = np.flatnonzero(target.weights > 0)
-    relative = target.relative()[used]
-    wanted = target.picture[used] - own[used]
+    asked, lamps, dark = target.picture[used], own[used], target.dark
+    lit = answers.picture(have)[used]
+    wanted = asked - lamps
     weights = target.weights[used]
     weights = weights / weights.sum()
     omega = cells.solid_angles / (4 * np.pi)
     # the present light, as bright as the target, is what is held to
-    levels = _levels(weights @ (shown[used] - own[used]), weights @ wanted)
+    levels = _levels(weights @ lit, weights @ wanted)
     level = float(levels.mean())
     mean = np.maximum(omega @ have, 1e-3 * float((omega @ have).max())) * levels
     mean = np.maximum(mean, 1e-12)
@@ -159,11 +206,12 @@ def free_light(
         matrix = answers.values[c][:, used]
         pull = pull_of(near) * omega / mean[c] ** 2
         hold = level ** (1 - near) * have[:, c]
-        some = np.ones(len(used))
-        link = np.ones(len(pairs))
+        made = lamps[:, c] + levels[c] * lit[:, c]
+        some, link = np.ones(len(used)), np.ones(len(pairs))
         x: NDArray[np.float64] | None = None
         for i in range(ROUNDS):
-            root = (np.sqrt(some * weights) / relative[:, c]).astype(np.float32)
+            relative = np.maximum(np.maximum(asked[:, c], made), 0) + dark
+            root = (np.sqrt(some * weights) / relative).astype(np.float32)
             weighted = matrix * root
             gram = (weighted @ weighted.T).astype(np.float64)
             right = (weighted @ (root * wanted[:, c].astype(np.float32))).astype(np.float64)
@@ -174,16 +222,14 @@ def free_light(
             np.add.at(gram, (one, two), -e)
             np.add.at(gram, (two, one), -e)
             x = nonnegative(gram, right + pull * hold, x)
-            off = (x.astype(np.float32) @ matrix - wanted[:, c]) / relative[:, c]
+            made = x.astype(np.float32) @ matrix + lamps[:, c]
+            off = (made - asked[:, c]) / (np.maximum(np.maximum(asked[:, c], made), 0) + dark)
             some = 1 / np.sqrt(off**2 + ODD**2)
             some /= weights @ some
             link = 1 / np.sqrt(((x[one] - x[two]) / mean[c]) ** 2 + STEP**2)
-            yield 0.1 + 0.8 * (c * ROUNDS + i + 1) / (3 * ROUNDS)
+            yield first + (last - first) * (c * ROUNDS + i + 1) / (3 * ROUNDS)
         found[:, c] = x
-    environment = cells.environment(found, height, present)
-    return concluded(
-        answers, target, answers.under(environment) + own, shown, scale, environment=environment
-    )
+    return found
 
 
 def _levels(shown: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:

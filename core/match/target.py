@@ -52,18 +52,29 @@ class Target:
                 "it again"
             )
 
-    def relative(self) -> NDArray[np.float64]:
+    def relative(self, shown: NDArray[np.float64]) -> NDArray[np.float64]:
         """Compute what an error of each pixel and colour is divided by.
 
-        A highlight so counts no more than a shadow, each relative to its own light.
+        A highlight so counts no more than a shadow, each relative to its own light. The brighter of
+        target and picture counts: a place that is to be dark and is not counts no more than one
+        that is to be bright.
+
+        Parameters
+        ----------
+        shown : (n, 3) float64
+            The picture so far.
 
         Returns
         -------
         (n, 3) float64
         """
-        bright = np.maximum(self.picture, 0)
-        mean = np.average(bright, axis=0, weights=self.weights)
-        return bright + DARK * max(float(mean.mean()), 1e-12)
+        return np.maximum(np.maximum(self.picture, shown), 0) + self.dark
+
+    @property
+    def dark(self) -> float:
+        """The light that is added where errors are taken relative to a pixel's light."""
+        mean = np.average(np.maximum(self.picture, 0), axis=0, weights=self.weights)
+        return DARK * max(float(mean.mean()), 1e-12)
 
     def scaled(self, gain: NDArray) -> Target:
         """Multiply the picture.

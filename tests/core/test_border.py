@@ -97,7 +97,7 @@ FLOW = {
     < faces < partition < hemicube < mix < exr < cryptomatte < capture < light < kit < supports
     < field < fit < lights < relight < catcher < preview < inside < place < match < verify""",
     "arto_addon": """interrupt < work < settings < blender < stage < shot < kit < world < plate
-    < fit < capture < relight < shoot < job < live < farm < ui""",
+    < fit < capture < relight < match < shoot < job < live < farm < ui""",
 }
 
 
