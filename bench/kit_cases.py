@@ -26,7 +26,8 @@ LIGHTS: dict[str, Light] = {
     "round": Light("a", Kind.ROUND, width=40, height=40, strength=6, kelvin=3500, **_AT, **_SOFT),
     "ring": Light("a", Kind.RING, width=50, height=50, strength=9, **_AT),
     "strip": Light("a", Kind.STRIP, width=80, height=8, strength=20, slope=0.6, **_AT),
-    "sun": Light("a", Kind.SUN, width=0.53, strength=3, **_AT),
+    # Of a smaller sun, in glass and mirrors, Cycles' own picture is nothing but specks.
+    "sun": Light("a", Kind.SUN, width=3, strength=3, **_AT),
     "flag": Light("a", Kind.FLAG, Blend.MULTIPLY, width=90, height=90, strength=0, **_AT, **_SOFT),
 }
 

@@ -1,7 +1,8 @@
 """The pictures of an artist's hour: `python -m tools.walk docs/walk`.
 
-They are taken by the test that walks it (tests/test_walk.py), in the real Blender with its window:
-needs Linux, Xvfb, xdotool, ImageMagick, and BLENDER, the command line of the Blender executable.
+They are taken by the tests that walk it (tests/test_walk.py, tests/test_light_walk.py), in the real
+Blender with its window: needs Linux, Xvfb, xdotool, ImageMagick, and BLENDER, the command line of
+the Blender executable.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ def main() -> int:
         print("walk: BLENDER is not set: the command line of the Blender to walk in")
         return 1
     shutil.rmtree(folder, ignore_errors=True)
-    line = [sys.executable, "-m", "pytest", "-q", "-rs", "tests/test_walk.py"]
+    tests = ["tests/test_walk.py", "tests/test_light_walk.py"]
+    line = [sys.executable, "-m", "pytest", "-q", "-rs", *tests]
     environment = {**os.environ, "ARTO_WALK": str(folder)}
     return subprocess.run(line, cwd=package.ROOT, env=environment).returncode
 

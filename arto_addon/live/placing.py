@@ -88,17 +88,21 @@ class Placer:
         self.field.close()
 
 
-def new_light(scene: bpy.types.Scene, what: What) -> str:
-    """Add a light to the kit that is to be put somewhere -> its name. Raises KitError."""
+def new_light(scene: bpy.types.Scene, what: What, placed: Placed) -> str:
+    """Add a light to the kit that is to be put somewhere -> its name. Raises KitError.
+
+    A flag is as large as what it is to hide.
+    """
     world = check_world(scene, layer_of(scene))
     kit = kits.put_in(world)
     name = kit.free_name(NAMES[what])
+    hides = float(np.clip(5 * placed.spread, 6.0, 90.0))
     light = {
         What.REFLECT: Light(name, width=14.0, height=14.0, softness=0.2, stops=3.0),
         What.LIGHT: Light(name, width=45.0, height=45.0, softness=0.3, stops=2.0),
         What.RIM: Light(name, width=30.0, height=30.0, softness=0.3, stops=4.0),
-        What.SHADE: Light(name, Kind.FLAG, Blend.MULTIPLY, width=20.0, height=20.0, softness=0.2,
-                          strength=0.0),
+        What.SHADE: Light(name, Kind.FLAG, Blend.MULTIPLY, width=hides, height=hides,
+                          softness=0.2, strength=0.0),
     }[what]  # fmt: skip
     kits.write(world, kit.with_light(light))
     return name
@@ -126,7 +130,7 @@ class Gesture:
         """Put the light where it shines at a pixel. Raises FieldError, KitError."""
         placed = self.placer.at(x, y, self.what)
         if not self.light:
-            self.light = new_light(self.scene, self.what)
+            self.light = new_light(self.scene, self.what, placed)
         return change(self.scene, self.light, placed=placed)
 
     def change(self, size: float = 1.0, roll: float = 0.0, stops: float = 0.0) -> Light | None:
