@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -12,14 +13,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core import exr
+from ...core import exr, picture_files
 from ...core.errors import ExrError
-from ...core.regular import open_regular
-
-# What a JPEG file ends with. Blender shows grey in place of what is cut off, and says nothing.
-_END_OF_JPEG = b"\xff\xd9"
-# Cameras write so many bytes behind a JPEG at most: in these its end is looked for.
-_BEHIND = 1 << 16
 
 
 class Timing(Protocol):
@@ -127,15 +122,19 @@ def whole_size(path: Path, finite: bool = False) -> tuple[int, int] | None:
     """Decode a file of a picture -> its width and height; None where it cannot be decoded.
 
     Of an EXR this is the display window. finite: whether the colours of its picture must be
-    numbers. Raises ExrError for an EXR, with what is wrong with it.
+    numbers. Raises ExrError for an EXR, and for pixels that are no numbers, with what is wrong.
     """
-    if path.suffix.lower() == ".exr":
+    try:
+        kind = picture_files.kind_of(path)
+    except OSError:
+        return None
+    if kind == "EXR":
         parts = exr.whole_parts(path)
         if finite:
-            _check_finite(path, parts)
+            _check_parts(path, parts)
         _, (x0, y0, x1, y1) = exr.windows(path)
         return x1 - x0 + 1, y1 - y0 + 1
-    if path.suffix.lower() in {".jpg", ".jpeg"} and _is_cut(path):
+    if picture_files.is_cut_file(path):
         return None
     try:
         image = bpy.data.images.load(str(path))
@@ -144,21 +143,62 @@ def whole_size(path: Path, finite: bool = False) -> tuple[int, int] | None:
     try:
         # Blender reads the file when it is asked for the size
         size = tuple(image.size)
+        if finite and kind == "TIFF" and min(size):
+            check_finite(image, str(path))
         return (size[0], size[1]) if min(size) else None
     finally:
         bpy.data.images.remove(image)
 
 
-def _check_finite(path: Path, parts: list[tuple[dict[str, Any], dict[str, NDArray]]]) -> None:
+def check_finite(image: bpy.types.Image, name: str) -> None:
+    """Raise ExrError where a colour of an image in memory is infinite or not a number."""
+    if image.is_float:
+        pixels = np.empty(len(image.pixels), np.float32)
+        image.pixels.foreach_get(pixels)
+        _check_colours(name, [pixels.reshape(-1, image.channels)[:, :3].T])
+
+
+def _check_parts(path: Path, parts: list[tuple[dict[str, Any], dict[str, NDArray]]]) -> None:
     """Raise ExrError where a colour of the picture itself is infinite or not a number."""
-    for _, channels in parts:
-        planes = [channels[name] for name in "RGB" if name in channels]
-        same = planes and len({plane.shape for plane in planes}) == 1
-        bad = int((~np.isfinite(planes)).any(axis=0).sum()) if same else 0
-        if bad:
-            raise ExrError(
-                f"{path} has {bad} pixels that are infinite or not a number: repair them"
-            )
+    for head, channels in parts:
+        part = str(head.get("name", ""))
+        planes = [plane for name, plane in channels.items() if _is_colour(name, part)]
+        _check_colours(str(path), planes)
+
+
+def _is_colour(channel: str, part: str) -> bool:
+    """Whether a channel is of the picture: of its root, or of the layer that a render calls so.
+
+    A single channel, Y, is the picture in a part without a name, and a layer in one that has one.
+    """
+    layer, _, letter = channel.rpartition(".")
+    letters = {"R", "G", "B"} if part else {"R", "G", "B", "Y"}
+    return letter.upper() in letters and layer.rpartition(".")[2] in {"", "Combined"}
+
+
+def _check_colours(name: str, planes: list[NDArray]) -> None:
+    bad = max((int((~np.isfinite(plane)).sum()) for plane in planes), default=0)
+    if bad:
+        raise ExrError(f"{name} has {bad} pixels that are infinite or not a number: repair them")
+
+
+@functools.lru_cache(4096)
+def _damage(path: Path, finite: bool, _: tuple[int, ...]) -> str:
+    # once for the look ahead, the first picture and the next ones, while the file is the same
+    return damage(path, finite)
+
+
+def damage_of(path: Path) -> str:
+    """Say what is wrong with a file whose colours must be numbers; once while it is the same."""
+    return _damage(path, True, state_of(path))
+
+
+def state_of(path: Path) -> tuple[int, ...]:
+    """What changes when a file is replaced; empty where there is none."""
+    if not path.is_file():
+        return ()
+    state = path.stat()
+    return state.st_ino, state.st_size, state.st_mtime_ns, state.st_ctime_ns
 
 
 def damage(path: Path, finite: bool = False) -> str:
@@ -174,14 +214,3 @@ def damage(path: Path, finite: bool = False) -> str:
     except ExrError as e:
         return str(e).partition(": ")[0]
     return ""
-
-
-def _is_cut(path: Path) -> bool:
-    """Whether the end of a JPEG file is missing."""
-    try:
-        with open_regular(path, follow=True) as file:
-            size = file.seek(0, 2)
-            file.seek(max(size - _BEHIND, 0))
-            return _END_OF_JPEG not in file.read()
-    except OSError:
-        return True

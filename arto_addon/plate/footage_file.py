@@ -8,7 +8,16 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import ExrError, SceneError
-from ..blender.sequences import Shown, Timing, damage, file_of, number_of, shown_at, whole_size
+from ..blender.sequences import (
+    Shown,
+    Timing,
+    damage_of,
+    file_of,
+    number_of,
+    shown_at,
+    state_of,
+    whole_size,
+)
 
 # What footage is.
 Source = bpy.types.Image | bpy.types.MovieClip
@@ -55,7 +64,7 @@ def check(source: Source, timing: Timing | None, frame: int) -> str:
         return warning if held else ""
     file = file_at(source, timing, frame)
     assert file is not None
-    if wrong := _damage(file, _state(file)):
+    if wrong := damage_of(file):
         raise SceneError(
             f"the footage '{source.name}' of frame {frame} cannot be used ({wrong}): put the file "
             "there, or choose other footage"
@@ -69,7 +78,7 @@ def check(source: Source, timing: Timing | None, frame: int) -> str:
                 "set its source to Image Sequence, if it is one"
             )
     if source.source == "SEQUENCE" and path != file and path.is_file():
-        here, there = _size(file, _state(file)), _size(path, _state(path))
+        here, there = _size(file, state_of(file)), _size(path, state_of(path))
         if here and there and here != there:
             raise SceneError(
                 f"the footage '{source.name}' has {here[0]}x{here[1]} pixels in {file.name}, and "
@@ -88,23 +97,9 @@ def _check_movie(source: Source, timing: Timing | None, frame: int, path: Path) 
         )
 
 
-def _state(path: Path) -> tuple[int, ...]:
-    """What changes when a file is replaced."""
-    if not path.is_file():
-        return ()
-    state = path.stat()
-    return state.st_ino, state.st_size, state.st_mtime_ns, state.st_ctime_ns
-
-
-# A file is decoded once for the look ahead, the first picture and the next ones. The second
-# argument of both functions is the state for which an answer holds.
-@lru_cache(4096)
-def _damage(path: Path, _: tuple[int, ...]) -> str:
-    return damage(path, finite=True)
-
-
 @lru_cache(4096)
 def _size(path: Path, _: tuple[int, ...]) -> tuple[int, int] | None:
+    # the second argument is the state of the file for which an answer holds
     try:
         return whole_size(path)
     except ExrError:

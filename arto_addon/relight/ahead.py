@@ -14,7 +14,7 @@ import bpy
 
 from ...core.errors import ArtoError, CaptureSetError, SceneError, StrictError
 from ...core.file_names import folded
-from ..blender import denoise, sequences
+from ..blender import denoise
 from ..capture.sequence import frame_kept
 from ..plate import mattes, plate
 from ..plate.names import numbers_frames, of_look, relit_file
@@ -22,6 +22,7 @@ from ..shot import paths
 from ..shot.shot import check_same_shot, shot_of
 from ..work import Progress, Steps
 from ..world.check import check_file, check_images, check_world, differs_by_rays
+from ..world.images import held_images
 from .inputs import inputs
 from .outputs import bytes_of, check_picture, check_room
 from .shown import Shown, check_film
@@ -148,11 +149,9 @@ def _map(file: Path) -> ArtoError | None:
     if not file.is_file():
         return SceneError(f"there is no environment map {file}")
     try:
-        check_file(file)
+        check_file(file, "the environment map")
     except SceneError as e:
         return e
-    if wrong := sequences.damage(file):
-        return SceneError(f"{wrong}: copy it anew, or choose another HDRI")
     return None
 
 
@@ -261,6 +260,8 @@ def warnings(shown: Shown, world: bpy.types.World | None) -> list[str]:
     if changed := shown.changed():
         # a warning, not an error: only the artist knows whether the change shows
         out.append(f"the scene is not the captured one: {'; '.join(changed[:3])}")
+    if world and (held := held_images(world, scene.frame_current)):
+        out.append(held)
     if world and (by_rays := differs_by_rays(world)):
         out.append(f"the world is {by_rays}")
     if said := shown.footage_warning():

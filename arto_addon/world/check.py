@@ -7,8 +7,9 @@ from pathlib import Path
 
 import bpy
 
-from ...core import exr
-from ...core.errors import ArtoError, SceneError
+from ...core import exr, picture_files
+from ...core.errors import ArtoError, ExrError, SceneError
+from ..blender import sequences
 from ..blender.nodes import shader_tree
 from ..blender.reached import gives, reached
 from ..shot.shot import layer_of
@@ -78,19 +79,33 @@ def check_images(world: bpy.types.World, frame: int) -> None:
     Cycles would show magenta in place of the image. The check loads the images, as a render would.
     """
     for node in image_nodes(world):
-        if node.image is None:
+        image = node.image
+        if image is None:
             continue
-        if node.image.source == "SEQUENCE":
+        if image.source != "MOVIE":
             for path in files_at(node, frame):
-                check_file(path)
-        elif node.image.source in {"FILE", "MOVIE", "TILED"} and min(node.image.size) == 0:
-            path = bpy.path.abspath(node.image.filepath, library=node.image.library)
-            raise _unreadable(node.image.name, Path(path))
+                check_file(path, f"the world's image '{image.name}'")
+        if image.packed_files or image.source == "GENERATED":
+            _check_in_memory(image)
+        elif image.source in {"FILE", "MOVIE", "TILED"} and min(image.size) == 0:
+            path = bpy.path.abspath(image.filepath, library=image.library)
+            raise _unreadable(image.name, Path(path))
+
+
+def _check_in_memory(image: bpy.types.Image) -> None:
+    """Raise SceneError where an image that is in no file is cut off, or has what is no number."""
+    packed = [file.packed_file.data for file in image.packed_files if file.packed_file]
+    if any(map(picture_files.is_cut, packed)) or min(image.size) == 0:
+        raise _unreadable(image.name, Path(image.filepath))
+    try:
+        sequences.check_finite(image, f"the world's image '{image.name}'")
+    except ExrError as e:
+        raise SceneError(f"{e}, or choose another") from e
 
 
 def _unreadable(name: str, path: Path) -> SceneError:
     with contextlib.suppress(ArtoError):
-        if path.suffix.lower() == ".exr" and (layers := exr.part_names(path)):
+        if path.suffix.lower() == ".exr" and any(layers := exr.part_names(path)):
             return SceneError(
                 f"the world's image '{name}' is an EXR of layers ({', '.join(layers[:3])}), which "
                 "Blender does not show as one picture: write the layer alone, as R, G, B"
@@ -101,8 +116,14 @@ def _unreadable(name: str, path: Path) -> SceneError:
     )
 
 
-def check_file(path: Path) -> None:
-    """Raise SceneError where a file cannot be read as the image of a world."""
+def check_file(path: Path, name: str = "the world's image") -> None:
+    """Raise SceneError where a file cannot be read as the image of a world.
+
+    That is where it is missing, cut off or damaged, has pixels that are no numbers, or is of layers
+    that Blender does not show as a picture.
+    """
+    if wrong := sequences.damage_of(path):
+        raise SceneError(f"{name} cannot be used ({wrong}): copy it anew, or choose another")
     try:
         alone = bpy.data.images.load(str(path))
     except RuntimeError as e:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import bpy
 
+from ...core import picture_files
 from ...core.errors import SceneError
 from .check import world_of
 from .controls import hdri
@@ -26,6 +27,8 @@ def check(path: Path) -> None:
             begins = file.read(8)
     except OSError as e:
         raise SceneError(f"{path} cannot be read ({e.strerror}): choose an HDRI") from e
+    if picture_files.is_cut_file(path):
+        raise SceneError(f"{path.name} is cut off: copy it anew, or choose another")
     if not begins.startswith(_BEGINNINGS):
         raise SceneError(f"{path.name} is no picture: choose an HDRI ({', '.join(ENDINGS[:2])})")
 

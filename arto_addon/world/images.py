@@ -33,6 +33,18 @@ def number_at(user: bpy.types.ImageUser, frame: int) -> int:
     return sequences.shown_at(user, frame).number
 
 
+def held_images(world: bpy.types.World, frame: int) -> str:
+    """Say which sequence or movie of a world does not last until a frame; "" for none."""
+    for node in image_nodes(world):
+        image = node.image
+        if image and image.source in _MOVE and sequences.shown_at(node.image_user, frame).held:
+            return (
+                f"the world's image '{image.name}' does not last until frame {frame}: another of "
+                "its pictures is held"
+            )
+    return ""
+
+
 def files_at(node: bpy.types.Node, frame: int) -> list[Path]:
     """The files that a node's image is read from at a frame; none where it is in no file."""
     if node.image is None:

@@ -35,7 +35,7 @@ from .still import context
 from .studio import of_textures
 
 # The version of how maps are made. Maps of another version are not used.
-VERSION = 2
+VERSION = 3
 # How many maps stay on disk: those that were used last.
 MOST = 12
 # The last map also stays in memory up to so many bytes, as a turntable needs only this map.

@@ -92,8 +92,8 @@ def test_the_house_is_as_the_architecture_says() -> None:
 # The rooms in the order of their imports: each may import those before it, and none after it. A
 # module that stands alone is a room by itself. docs/architecture.md quotes both lists.
 FLOW = {
-    "core": """errors < units < memory < regular < checksum < before < marked < files < arrays
-    < signed < region < file_names < description < values < shot < metrics < patterns < measure
+    "core": """errors < units < memory < regular < picture_files < checksum < before < marked
+    < files < arrays < signed < region < file_names < description < values < shot < metrics < patterns < measure
     < faces < partition < hemicube < mix < exr < cryptomatte < capture < light < kit < supports
     < field < fit < lights < relight < catcher < preview < inside < place < match < verify""",
     "arto_addon": """interrupt < work < settings < blender < stage < shot < kit < world < plate
