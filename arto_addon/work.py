@@ -114,7 +114,11 @@ def blocking_render(request: Render) -> None:
     except KeyboardInterrupt:
         result = {"CANCELLED"}
     except RuntimeError as e:
-        raise SceneError(f"Cycles could not render: {e}") from e
+        said = str(e).strip().rstrip(".")
+        raise SceneError(
+            f"Cycles could not render: {said}. If the console says that a file could not be "
+            "written, make room on the disk (or raise the limit: quota, ulimit -f)"
+        ) from e
     finally:
         bpy.app.handlers.render_cancel.remove(on_cancel)
     request.state = "cancelled" if ended or "FINISHED" not in result else "done"

@@ -36,6 +36,8 @@ _QUIETLY = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(
 SAFELY = _NOFOLLOW | _QUIETLY
 # Errors that say nothing of what is in a file: who may read it, or the disk.
 WITHHELD = (errno.EACCES, errno.EPERM, errno.EIO, errno.ENOMEM, errno.ESTALE, errno.ETIMEDOUT)
+# Errors of a disk, or of a file's size, that has no more room.
+FULL = (errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC))
 # Seconds for which Windows may keep a file that somebody reads from being replaced.
 _PATIENCE = 3.0
 _WINDOWS = os.name == "nt"

@@ -17,8 +17,9 @@ from ...core.capture.head import CaptureHead
 from ...core.capture.kinds import Route, Take
 from ...core.capture.names import GRAIN, GROUP, group_name
 from ...core.capture.tile_entry import sums_of
-from ...core.errors import ArtoError, CaptureSetError
+from ...core.errors import ArtoError, CaptureSetError, ExrError
 from ...core.files import Lock, whole
+from ...core.units import size
 from ..blender.output import write_to
 from ..fit.guides import cleaned
 from ..shot import paths
@@ -26,7 +27,7 @@ from ..shot.shot import shot_of
 from ..stage import takes
 from ..stage.stage import Stage, set_region
 from ..work import Progress, Render, Steps, Warned, Wrote
-from . import beside, planes
+from . import beside, planes, room
 from .asked import Asked, asked, begun
 from .check import check_patterns, check_room_of, check_scene
 from .plan import render_plan
@@ -332,4 +333,16 @@ def _render(
                 f"Blender did not write {path}: make room on the disk, or choose a folder that "
                 "can be written"
             )
-        check_file(partial, images)
+        try:
+            check_file(partial, images)
+        except ExrError as e:
+            raise CaptureSetError(f"what was rendered is not whole ({e}). {_room(path)}") from e
+
+
+def _room(path: Path) -> str:
+    """What to do where a render could not be written, in words."""
+    free = size(room.free_disk(path.parent))
+    return (
+        f"If the console says that a file could not be written: {path.parent} has {free} free, and "
+        "there may be a limit for files (quota, ulimit -f); make room, and capture again"
+    )

@@ -84,7 +84,7 @@ def relit_file(scene: bpy.types.Scene, look: str | None = None, frame: int | Non
     """The path of a plate's EXR.
 
     look, frame: the plate's (default: the scene's now). Raises SceneError where the path depends on
-    a .blend that was never saved.
+    a .blend that was never saved, or is a folder.
     """
     at: int = scene.frame_current if frame is None else frame
     look = scene.arto.look.strip() if look is None else look
@@ -94,6 +94,10 @@ def relit_file(scene: bpy.types.Scene, look: str | None = None, frame: int | Non
         path = home.absolute(scene.arto.output)
         if scene.arto.output.endswith(("/", "\\")):
             path = path / (Path(home.file()).stem or _PLAIN)
+        elif path.name in ("", "..") or (path.is_dir() and path.suffix.lower() != ".exr"):
+            raise SceneError(
+                f"{path} is a folder: end it with / to write into it, or name a file (.exr)"
+            )
         if path.suffix.lower() in _PICTURES:
             path = path.with_suffix(".exr")
         elif path.suffix.lower() != ".exr":  # The dot belongs to the name, as in `shot.v2`.

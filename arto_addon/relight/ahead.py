@@ -12,13 +12,14 @@ from pathlib import Path
 
 import bpy
 
+from ...core.capture.head import HEADER as CAPTURE_HEADER
 from ...core.errors import ArtoError, CaptureSetError, SceneError, StrictError
 from ...core.file_names import folded
 from ..blender import denoise
 from ..capture.sequence import frame_kept
 from ..plate import mattes, plate
 from ..plate.names import numbers_frames, of_look, relit_file
-from ..shot import paths
+from ..shot import paths, status
 from ..shot.shot import check_same_shot, shot_of
 from ..work import Progress, Steps
 from ..world.check import check_file, check_images, check_world, differs_by_rays
@@ -260,6 +261,10 @@ def warnings(shown: Shown, world: bpy.types.World | None) -> list[str]:
     if changed := shown.changed():
         # a warning, not an error: only the artist knows whether the change shows
         out.append(f"the scene is not the captured one: {'; '.join(changed[:3])}")
+    beside = shown.field.folder.parent / "capture" / CAPTURE_HEADER
+    captured, key = status.capture_at(beside), shown.field.about.key
+    if captured and key and captured.head.key not in (None, key):
+        out.append("the reflectance field is of an earlier capture than the newest one: fit again")
     if world and (held := held_images(world, scene.frame_current)):
         out.append(held)
     if world and (by_rays := differs_by_rays(world)):

@@ -103,9 +103,10 @@ def _all(scene: bpy.types.Scene) -> Iterator[Input]:
         yield Input("the Cryptomattes", path, form if has_number(path) else "")
     if home.file():
         yield Input("the .blend", Path(home.file()))
-    # what else Blender reads, but for the plates that it shows
+    # what else Blender reads, but for the plates that it shows, which may be gone
     for source in [*bpy.data.images, *bpy.data.movieclips]:
-        if source.filepath and _is_others(_absolute(source)):
+        path = _absolute(source)  # of tiles it is the name of none
+        if source.filepath and (source.source == "TILED" or _is_others(path)):
             yield from _of_image("a file of the scene", source)
     for path in map(Path, bpy.utils.blend_paths(absolute=True)):
         if _is_others(path):

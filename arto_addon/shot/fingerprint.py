@@ -21,7 +21,7 @@ import numpy as np
 
 from ..blender.markers import camera_of
 from ..work import driven
-from . import pixels, walk
+from . import external, pixels, walk
 
 Fingerprint = dict[str, str]
 
@@ -99,7 +99,11 @@ def in_pieces(
     roots += filter(None, [layer.material_override])
     out = {"Render settings": _settings(scene, layer)}
     del layer
-    out |= yield from _blocks(roots, then, full, set())
+    asked: set[str] = set()
+    out |= yield from _blocks(roots, then, full, set(), scene.frame_current, asked)
+    for name in asked:
+        there = scene.view_layers[view_layer]
+        out[f"Attribute '{name}' of the view layer"] = external.attribute(scene, there, name)
     out |= yield from _worked_out(scene, view_layer)
     return dict(sorted(out.items()))
 
@@ -119,9 +123,18 @@ def of_blocks(
 
 
 def _blocks(
-    roots: Iterable[bpy.types.ID], then: Fingerprint, full: bool, passed: set[tuple[int, type]]
+    roots: Iterable[bpy.types.ID],
+    then: Fingerprint,
+    full: bool,
+    passed: set[tuple[int, type]],
+    frame: int | None = None,
+    asked: set[str] | None = None,
 ) -> Pieces:
-    """Make the fingerprint of data-blocks, in pieces. passed: parts that do not count."""
+    """Make the fingerprint of data-blocks, in pieces.
+
+    passed: parts that do not count; frame: of sequences of files, None where it does not count;
+    asked: gets the names that Attribute nodes ask the view layer for.
+    """
     out: Fingerprint = {}
     queue = list(roots)
     seen = {block.session_uid for block in queue}
@@ -140,10 +153,15 @@ def _blocks(
             digest += _arrays[block.session_uid]
         elif isinstance(block, bpy.types.Image):
             was = then.get(name, "")[len(digest) :]
-            digest += pixels.image(block, was, full)
+            digest += pixels.image(block, was, full, frame)
         elif isinstance(block, _EXTERNAL):
             was = then.get(name, "")[len(digest) :]
-            digest += walk.file(block.filepath, block.library, was, full)
+            digest += external.digest(external.of_block(block, frame), was, full)
+        if named := list(external.named(block, looked.files, frame)):
+            was = then.get(name, "")[len(digest) :]
+            digest += external.digest_named(named, was, full, frame)
+        if asked is not None:
+            asked |= looked.attributes
         out[name] = digest
         for found in looked.found:
             if found.session_uid not in seen:

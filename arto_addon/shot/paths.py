@@ -77,7 +77,10 @@ def _shot_in(folder: Path) -> tuple[Shot, str] | None:
         return Shot.from_json(said.data.get("shot")), said.kind("blend", str, "")
     except ArtoError:
         # A folder whose shot cannot be read is passed by: nothing is written into it.
-        return Shot("", 0, 0, 0, (), (), scene_id="damaged"), ""
+        return _DAMAGED, ""
+
+
+_DAMAGED = Shot("", 0, 0, 0, (), (), scene_id="damaged")
 
 
 def _is_ours(shot: Shot, there: Shot) -> bool:
@@ -106,6 +109,11 @@ def _look(root: Path, shot: Shot, origin: bpy.types.Scene | None) -> Place:
         there = _shot_in(folder)
         if there is None:
             own = own or folder
+        elif there[0] is _DAMAGED and _anything_in(folder):
+            raise ShotError(
+                f"{folder / HEADER} is damaged, and it says whose the captures beside it are: put "
+                "a copy of it back; or remove it, if they are this shot's; or move the folder away"
+            )
         elif _is_ours(shot, there[0]):
             if _anything_in(folder):
                 return Place(folder, folder)
@@ -149,7 +157,8 @@ _HEADERS = (("capture", CAPTURE_HEADER), ("field", FIELD_HEADER))
 def place(scene: bpy.types.Scene, view_layer: str | None = None, fresh: bool = True) -> Place:
     """Find where the files of the scene's shot are.
 
-    fresh: look at the disk even if the last look was a moment ago. Raises SceneError, OSError.
+    fresh: look at the disk even if the last look was a moment ago. Raises SceneError, OSError, and
+    ShotError where a folder with this shot's names does not say whose it is.
     """
     root, shot, origin = _root(scene), shot_of(scene, view_layer), scene_ids.copied_from(scene)
     key = root, shot, origin.name if origin else ""

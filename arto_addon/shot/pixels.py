@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from . import walk
+from . import external, walk
 
 # So many bytes are read in a moment: they are read at each look.
 FEW = 1 << 22
@@ -50,14 +50,19 @@ def reading() -> bool:
     return any(kept.thread.is_alive() for kept in _kept.values())
 
 
-def image(block: bpy.types.Image, then: str = "", full: bool = False) -> str:
+def image(
+    block: bpy.types.Image, then: str = "", full: bool = False, frame: int | None = None
+) -> str:
     """The digest of an image: of its painted or generated pixels, else of packed data or the file.
 
     then: the digest that the new one will be compared with. A file with a new time and the same
     size is read. If its contents are the same, the answer is `then`. full: read all of it now.
+    frame: at which a sequence is shown; None where that does not count.
     """
     painted = block.is_dirty or (block.source == "GENERATED" and not block.packed_file)
     if not painted and not block.packed_files:
+        if block.source in {"TILED", "SEQUENCE"}:
+            return external.digest(external.of_image(block, frame), then, full)
         return walk.file(block.filepath, block.library, then, full)
     size = block.size[0] * block.size[1] * 16
     if not painted:

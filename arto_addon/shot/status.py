@@ -11,7 +11,7 @@ import bpy
 
 from ...core.capture.capture_set import CaptureSet
 from ...core.capture.head import HEADER, CaptureHead
-from ...core.errors import ArtoError
+from ...core.errors import ArtoError, ShotError
 from ...core.field.field import Field
 from ...core.field.head import HEADER as FIELD_HEADER
 from ...core.shot import Shot
@@ -84,8 +84,11 @@ def done(head: CaptureHead) -> str:
 
 def capture_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line | None:
     """Say what capture a shot has, and whether the shot as it is now can use it; None without."""
-    place = _place(scene, view_layer)
-    if place is None:
+    try:
+        place = paths.place(scene, view_layer, fresh=bpy.app.background)
+    except ShotError as e:
+        return str(e), False
+    except (ArtoError, OSError):
         return None
     if place.owner:
         return f"captured for {place.owner}", False

@@ -84,8 +84,14 @@ _ARRAY_OWNERS = (
 _CUSTOM = (bpy.types.Object, bpy.types.Mesh, bpy.types.Material, bpy.types.Camera, bpy.types.Light)
 
 
+_OF_LAYER = {"VIEW_LAYER"}
+
+
 class Walk:
     """The digest of a data-block, and in `found` the data-blocks that it points to.
+
+    files: of each property that names a file or folder, what it belongs to, and its value;
+    attributes: the names that Attribute nodes ask the view layer for.
 
     passed: parts of the data-block that do not count, by pointer and type.
     """
@@ -93,6 +99,8 @@ class Walk:
     def __init__(self, block: bpy.types.ID, passed: Iterable[tuple[int, type]] = ()) -> None:
         self._hash = hashlib.blake2b(digest_size=12)
         self.found: list[bpy.types.ID] = []
+        self.files: list[tuple[bpy.types.bpy_struct, str]] = []
+        self.attributes: set[str] = set()
         self._seen: set[tuple[int, type]] = set(passed)
         self._struct(block, 0)
 
@@ -110,6 +118,8 @@ class Walk:
             return
         self._seen.add(key)
         node = isinstance(value, bpy.types.Node)
+        if isinstance(value, bpy.types.ShaderNodeAttribute) and value.attribute_type in _OF_LAYER:
+            self.attributes.add(value.attribute_name)
         for name, kind, array in _properties(type(value), value.bl_rna):
             if node and name in _NODES_OWN:
                 continue
@@ -126,6 +136,7 @@ class Walk:
             elif kind == "PATH":
                 # A file's folder may change when the .blend moves, so only the file's name counts.
                 self._put(name, item.replace("\\", "/").rpartition("/")[2])
+                self.files.append((value, item))
             else:
                 self._put(name, sorted(item) if isinstance(item, set) else _plain(item))
         if not isinstance(value, bpy.types.ID) or isinstance(value, _CUSTOM):
@@ -157,7 +168,9 @@ class Walk:
             return
         embedded = isinstance(item, bpy.types.ID) and item.is_embedded_data
         if isinstance(item, bpy.types.ID) and not embedded:
-            if not isinstance(item, _OTHERS):
+            if isinstance(item, bpy.types.Text):  # a lamp's profile, or a shader's script
+                self._put(name, item.as_string())
+            elif not isinstance(item, _OTHERS):
                 self._put(name, type(item).__name__, item.name_full)
                 self.found.append(item)
             return

@@ -7,6 +7,7 @@ say what there is of a shot.
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 import os
 import sys
@@ -58,6 +59,9 @@ def command(arguments: list[str]) -> int:
 
 def main(arguments: list[str]) -> int:
     """Run the verb that the arguments name; returns the exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # names of files may be no text
+            stream.reconfigure(errors="backslashreplace")
     try:
         options = vars(parser().parse_args(arguments))
     except SystemExit as e:
@@ -76,7 +80,7 @@ def main(arguments: list[str]) -> int:
             return 0
         lines = OpenJDLines() if options.get("openjd") else ProgressLines(verb)
         file = options.pop("json", None)
-        report = Report(verb, file.resolve() if file else None, lines)
+        report = Report(verb, file.resolve() if file else None, lines, options.get("job"))
     except (ArtoError, OptionError) as e:
         print(f"ARTO: {e}", file=sys.stderr)
         return CODES["wrong options" if isinstance(e, OptionError) else "failed"]
@@ -86,6 +90,8 @@ def main(arguments: list[str]) -> int:
         if options.get("openjd"):
             print(f"openjd_fail: {e}", flush=True)
         return report.ended(e)
+    except UnicodeEncodeError as e:  # a description, or a name, with what is no text
+        return report.ended(SceneError(f"{e.object!a} is no text that can be written: rename it"))
     except Exception as e:
         traceback.print_exc()
         return report.ended(e)
@@ -199,8 +205,9 @@ def _scene(options: dict[str, Any]) -> tuple[bpy.types.Scene, str]:
         given = options.get(path)
         if given and not given.startswith("//"):
             # a slash at the end says that the output is a folder
-            end = "/" if given.endswith(("/", "\\")) else ""
-            options[path] = str(Path(given).resolve()) + end
+            whole = str(Path(given).resolve())
+            end = "/" if given.endswith(("/", "\\")) and not whole.endswith("/") else ""
+            options[path] = whole + end
     if options.get("faces"):
         options["faces"] = set(options["faces"])
         options["preset"] = "custom"

@@ -15,10 +15,12 @@ import bpy
 from ...core import exr
 from ...core.capture.capture_set import CaptureSet
 from ...core.capture.head import HEADER as CAPTURE_HEADER
-from ...core.errors import ArtoError
-from ...core.field.field import Field
+from ...core.errors import ArtoError, ShotError
+from ...core.field.field import Field, proxy_folder
 from ...core.field.head import HEADER as FIELD_HEADER
+from ...core.field.proxy import FACTORS
 from ...core.field.tile_file import TileFile
+from ...core.shot import Shot
 from ..capture.sequence import frame_kept
 from ..plate import plate
 from ..plate.marks import is_of
@@ -26,6 +28,7 @@ from ..plate.together import beside, older_prefix
 from ..relight import ahead
 from ..relight.light_key import HEADER, light_key
 from ..shot import paths, status
+from ..shot.shot import shot_of
 from ..stage.takes import TAKES
 from ..world.check import world_of
 
@@ -126,8 +129,12 @@ def inventory(
 
 def _of_shot(scene: bpy.types.Scene, view_layer: str) -> Iterator[Thing]:
     """The capture and the field of a shot, and those of its takes."""
-    place = paths.place(scene, view_layer)
-    source = place.source
+    try:
+        place = paths.place(scene, view_layer)
+    except ShotError as e:
+        yield Thing("shot", Path(), "damaged", str(e))
+        return
+    source, now = place.source, shot_of(scene, view_layer)
     if place.owner:
         yield Thing("capture", source / "capture", "missing", f"captured for {place.owner}")
         return
@@ -136,11 +143,18 @@ def _of_shot(scene: bpy.types.Scene, view_layer: str) -> Iterator[Thing]:
     takes = [name for name in TAKES if (source / name).is_dir()]
     for folder in (source, *(source / name for name in takes)):
         name = f" {folder.name}" if folder != source else ""
-        yield _capture(f"capture{name}", folder / "capture")
-        yield _field(f"field{name}", folder / "field")
+        captured, fitted = folder / "capture", folder / "field"
+        yield _capture(f"capture{name}", captured, now)
+        yield _field(f"field{name}", fitted, now, _key_of(captured))
 
 
-def _capture(kind: str, folder: Path) -> Thing:
+def _key_of(folder: Path) -> str | None:
+    """The key of a capture set; None where it has none, or is damaged."""
+    there = status.capture_at(folder / CAPTURE_HEADER)
+    return there.head.key if there else None
+
+
+def _capture(kind: str, folder: Path, now: Shot) -> Thing:
     if not (folder / CAPTURE_HEADER).is_file():
         return Thing(kind, folder, "missing")
     try:
@@ -150,23 +164,42 @@ def _capture(kind: str, folder: Path) -> Thing:
                 pass  # its files were compared with their checksums
     except ArtoError as e:
         return Thing(kind, folder, "damaged", str(e))
+    return _of_now(kind, folder, there.head.shot, now)
+
+
+def _of_now(kind: str, folder: Path, then: Shot | None, now: Shot) -> Thing:
+    """What is whole; said is where it is of another shot, such as of another frame."""
+    difference = then.difference(now) if then else None
+    if difference:
+        return Thing(kind, folder, "outdated", f"it is of {difference}")
     return Thing(kind, folder, "whole")
 
 
-def _field(kind: str, folder: Path) -> Thing:
+def _field(kind: str, folder: Path, now: Shot, key: str | None) -> Thing:
     if not (folder / FIELD_HEADER).is_file():
         return Thing(kind, folder, "missing")
     try:
         with Field(folder) as there:
-            for tile in there.tiles:
-                tile.has_layer("alpha")
-                if tile.path.is_file():
-                    file = TileFile(tile.path)
-                    for name in file.sizes:
-                        file.load(name)  # compares it with its checksum
+            _compare(there)
+            for factor in FACTORS:
+                if proxy_folder(folder, factor).exists():
+                    with there.proxy(factor) as small:
+                        _compare(small)
     except ArtoError as e:
         return Thing(kind, folder, "damaged", str(e))
-    return Thing(kind, folder, "whole")
+    if None not in (key, there.about.key) and key != there.about.key:
+        return Thing(kind, folder, "outdated", "it is of another capture than the one beside it")
+    return _of_now(kind, folder, there.about.shot, now)
+
+
+def _compare(field: Field) -> None:
+    """Compare all arrays of a field with their checksums. Raises FieldError."""
+    for tile in field.tiles:
+        tile.has_layer("alpha")
+        if tile.path.is_file():
+            file = TileFile(tile.path)
+            for name in file.sizes:
+                file.load(name)  # compares it with its checksum
 
 
 def _of_plate(scene: bpy.types.Scene, view_layer: str, path: Path) -> Iterator[Thing]:

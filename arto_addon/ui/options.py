@@ -7,6 +7,7 @@ import math
 import re
 from pathlib import Path
 
+from ...core.file_names import is_text
 from ..settings import table
 from ..settings.setting import Setting
 
@@ -28,7 +29,9 @@ def parser() -> argparse.ArgumentParser:
     files = argparse.ArgumentParser(add_help=False)
     files.add_argument("--scene", help="name of the scene (default: the .blend's)")
     files.add_argument("--view-layer", help="name of the view layer (default: the scene's)")
-    files.add_argument("--folder", help="where capture set and field are kept (default: //arto/)")
+    files.add_argument(
+        "--folder", type=_text, help="where capture set and field are kept (default: //arto/)"
+    )
     told = _told()
     for name, text, settings in (
         ("capture", "render the basis images", table.options("hemicube", "capture")),
@@ -59,10 +62,10 @@ def parser() -> argparse.ArgumentParser:
             )
         if name == "relight":
             one.add_argument(
-                "--worlds", nargs="+", type=Path, help="environment maps, in the world's place"
+                "--worlds", nargs="+", type=_path, help="environment maps, in the world's place"
             )
             one.add_argument(
-                "--kit", type=Path, metavar="FILE", help="a light kit that the world gets first"
+                "--kit", type=_path, metavar="FILE", help="a light kit that the world gets first"
             )
             one.add_argument(
                 "--turntable",
@@ -71,7 +74,7 @@ def parser() -> argparse.ArgumentParser:
                 help="so many pictures, turned once around",
             )
         if name == "plan":
-            one.add_argument("--job", type=Path, required=True, help="the folder to plan into")
+            one.add_argument("--job", type=_path, required=True, help="the folder to plan into")
             one.add_argument(
                 "--tiles", type=_from_one, help="tiles a frame (default: by the memory)"
             )
@@ -93,12 +96,12 @@ def parser() -> argparse.ArgumentParser:
                 action="store_true",
                 help="save it for a Blender without ARTO to render, and render nothing",
             )
-        one.add_argument("--job", type=Path, required=True, help="the folder of the job")
+        one.add_argument("--job", type=_path, required=True, help="the folder of the job")
         one.add_argument(
             "--openjd", action="store_true", help="say the progress as Open Job Description has it"
         )
     # these two are started by the window
-    jobs.add_parser("job").add_argument("task", type=Path)
+    jobs.add_parser("job").add_argument("task", type=_path)
     jobs.add_parser("maps")
     return out
 
@@ -114,7 +117,7 @@ def _told() -> argparse.ArgumentParser:
     out.add_argument("--strict", action="store_true", help="a warning is an error")
     out.add_argument(
         "--json",
-        type=Path,
+        type=_path,
         metavar="FILE",
         help="write down what was written, warned of and failed",
     )
@@ -124,7 +127,7 @@ def _told() -> argparse.ArgumentParser:
 def _add_light(one: argparse.ArgumentParser) -> None:
     one.add_argument(
         "--json",
-        type=Path,
+        type=_path,
         metavar="FILE",
         help="a file that is there: the world gets its kit; else the world's kit is written there "
         "(-: in the last line)",
@@ -132,7 +135,7 @@ def _add_light(one: argparse.ArgumentParser) -> None:
     one.add_argument("--write", action="store_true", help="write the file though it is there")
     one.add_argument("--save", action="store_true", help="save the .blend with the kit of the file")
     one.add_argument(
-        "--hdri", type=Path, metavar="EXR", help="write the world's light, with a kit or without"
+        "--hdri", type=_path, metavar="EXR", help="write the world's light, with a kit or without"
     )
 
 
@@ -147,7 +150,7 @@ def _add_adopt(one: argparse.ArgumentParser) -> None:
     one.add_argument(
         "--from",
         dest="source",
-        type=Path,
+        type=_path,
         metavar="FOLDER",
         help="a shot's folder, or one above several (default: what the scene's ID leads to)",
     )
@@ -165,7 +168,7 @@ def _add_status(one: argparse.ArgumentParser) -> None:
     one.add_argument(
         "--json",
         nargs="?",
-        type=Path,
+        type=_path,
         const=Path("-"),
         metavar="FILE",
         help="say it as JSON, in the last line or in a file",
@@ -187,6 +190,18 @@ def frames(text: str) -> range:
     if max(abs(found[0]), abs(found[-1])) > _LAST_FRAME:
         raise argparse.ArgumentTypeError(f"'{text}': Blender counts frames up to {_LAST_FRAME}")
     return found
+
+
+def _path(text: str) -> Path:
+    """A path that is text: no EXR file can have a name of any bytes."""
+    if not is_text(Path(text)):
+        raise argparse.ArgumentTypeError(f"{text!a} is not written in UTF-8: rename it")
+    return Path(text)
+
+
+def _text(text: str) -> str:
+    """A text that can be written."""
+    return str(_path(text)) and text
 
 
 def _from_one(text: str) -> int:
@@ -214,5 +229,5 @@ def _add_option(out: argparse.ArgumentParser, setting: Setting) -> None:
     elif setting.kind == "switch":
         out.add_argument(flag, help=words, action=argparse.BooleanOptionalAction)
     else:
-        kind = {"whole": int, "number": _number, "text": str}[setting.kind]
+        kind = {"whole": int, "number": _number, "text": _text}[setting.kind]
         out.add_argument(flag, help=words, type=kind)

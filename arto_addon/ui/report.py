@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
-from ...core.errors import ArtoError, CancelledError
+from ...core.errors import ArtoError, CancelledError, FilesError, SceneError
+from ...core.file_names import is_text
 from ...core.files import write_text
-from ...core.regular import json_object
+from ...core.regular import FULL, json_object
+from ..shot.home import check_outside
 from ..work import Failed, Progress, Render, Warned, Wrote
 
 FORMAT, VERSION = "ARTO report", 1
@@ -33,8 +36,26 @@ class OptionError(Exception):
     """An option whose value cannot be."""
 
 
-def check_file(path: Path, form: str) -> None:
-    """Raise OptionError where a file is there that ARTO has not written. form: its `format`."""
+# Files that ARTO writes itself have such names: a report would be written over by them.
+_TAKEN = re.compile(r"(?i)lock|(shot|arto-folder)\.json|.*\.(exr|arto|npy|blend|js|part)")
+_OF_JOB = {"job.json", "openjd.json", "templates.json", "commands.txt"}
+
+
+def check_file(path: Path, form: str, job: Path | None = None) -> None:
+    """Look at the place of a file of JSON. form: its `format`; job: the folder of a farm's job.
+
+    Raises OptionError where a file is there that ARTO has not written, and where ARTO writes other
+    files of that name or removes the folder.
+    """
+    if not is_text(path):
+        raise OptionError(f"--json {str(path)!a}: the name is not written in UTF-8")
+    of_job = job is not None and path.parent == job.resolve() and path.name.lower() in _OF_JOB
+    if of_job or _TAKEN.fullmatch(path.name):
+        raise OptionError(f"--json {path}: ARTO's own files have such names, choose another")
+    try:
+        check_outside(path, "a report")
+    except SceneError as e:
+        raise OptionError(f"--json {e}") from e
     if not os.path.lexists(path) or (path.is_file() and path.stat().st_size == 0):
         return
     if json_object(path, _MOST).get("format") != form:
@@ -46,11 +67,16 @@ class Report:
 
     verb: the command; path: the file to write, or None; lines: tells each step. The file says
     "unfinished" from the beginning, so what a killed process leaves is not taken for the report
-    before. Raises OptionError where the file cannot be written, or is something else.
+    before. job: the folder of a farm's job. Raises OptionError where the file cannot be written, or
+    is something else; FilesError where the disk is full.
     """
 
     def __init__(
-        self, verb: str, path: Path | None, lines: Callable[[Progress | Render], None]
+        self,
+        verb: str,
+        path: Path | None,
+        lines: Callable[[Progress | Render], None],
+        job: Path | None = None,
     ) -> None:
         self.verb, self.path, self.lines = verb, path, lines
         self.outcome: Outcome = "unfinished"
@@ -60,11 +86,14 @@ class Report:
         self._errors: list[BaseException] = []
         self._begun = time.perf_counter()
         if path is not None:
-            check_file(path, FORMAT)
+            check_file(path, FORMAT, job)
             try:
                 self.write()
             except OSError as e:
-                raise OptionError(f"--json {path} cannot be written ({e})") from e
+                said = f"--json {path} cannot be written ({e})"
+                if e.errno in FULL:
+                    raise FilesError(f"{said}: make room on the disk") from e
+                raise OptionError(said) from e
 
     def __call__(self, step: Progress | Render) -> None:
         """Tell a step, and note what it wrote, warned of or failed in."""

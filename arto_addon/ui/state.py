@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 
 from ...core.capture.head import HEADER, CaptureHead
-from ...core.errors import ArtoError
+from ...core.errors import ArtoError, ShotError
 from ...core.field.head import HEADER as FIELD_HEADER
 from ...core.shot import Shot
 from ...core.units import clock, size
@@ -57,6 +57,8 @@ def told(scene: bpy.types.Scene) -> Told:
     layer = layer_of(scene)
     try:
         place = paths.place(scene, layer, fresh=bpy.app.background)
+    except ShotError:
+        return Told("blocked", ("A file of the shot is damaged:", paths.HEADER), "Capture")
     except ArtoError:
         return Told("blocked", ("This file was never saved:", "save it first"), "Capture")
     except OSError as e:

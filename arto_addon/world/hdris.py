@@ -27,10 +27,10 @@ def check(path: Path) -> None:
             begins = file.read(8)
     except OSError as e:
         raise SceneError(f"{path} cannot be read ({e.strerror}): choose an HDRI") from e
-    if picture_files.is_cut_file(path):
-        raise SceneError(f"{path.name} is cut off: copy it anew, or choose another")
     if not begins.startswith(_BEGINNINGS):
         raise SceneError(f"{path.name} is no picture: choose an HDRI ({', '.join(ENDINGS[:2])})")
+    if picture_files.is_cut_file(path):
+        raise SceneError(f"{path.name} is cut off: copy it anew, or choose another")
 
 
 def folder(scene: bpy.types.Scene) -> str:

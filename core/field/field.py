@@ -127,7 +127,11 @@ class Field:
                 f"{self.folder} has no proxy of 1/{factor}: only fields of 'auto', 'whole', "
                 "'linear' and 'box' have; take the field itself, or fit again"
             )
-        return Field(folder)
+        found = Field(folder)
+        mine, its = ((about.key, about.take) for about in (self.about, found.about))
+        if mine != its:
+            raise FieldError(f"{folder} is a proxy of another field: fit again")
+        return found
 
     def shares(self) -> dict[str, float]:
         """Which share of all pairs of a pixel and a patch each model took.

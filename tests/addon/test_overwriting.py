@@ -77,6 +77,7 @@ def test_a_texture_and_what_else_the_scene_reads_stays(shot, there):
     font.write_bytes(b"no font")
     volume = bpy.data.volumes.new("Smoke")
     volume.filepath = str(there / "smoke.vdb")
+    (there / "smoke.vdb").write_bytes(b"no smoke")
     try:
         shot.arto.output = str(there / "tex.exr")
         refused(shot, "a texture of the scene")
@@ -103,6 +104,11 @@ def test_files_without_a_mark_stay_unless_the_artist_wants_it(shot, there):
     work.run(relight.compute(shot, layer))
     assert (there / "shot_data.exr").read_bytes() == theirs
     work.run(relight.compute(shot, layer))  # over ARTO's own
+    shown = bpy.data.images.load(str(plate))  # in a compositor; and the file is gone
+    work.run(relight.compute(shot, layer))
+    plate.unlink()
+    work.run(relight.compute(shot, layer))
+    bpy.data.images.remove(shown)
     picture(there / "shot_layers.exr")
     shot.arto.overwrite = True
     work.run(relight.compute(shot, layer))
