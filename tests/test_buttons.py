@@ -230,22 +230,18 @@ def test_what_the_buttons_do_with_a_shot(walk: Walk) -> None:
     assert w.get("scene.world.name != world")
     w.do("scene.arto.layers = 'OFF'")
 
-    # Frames: a capture and a plate of each, shown one after the other; in the mixed light they are
-    # darker
+    # Frames: a capture and a plate of each, shown at the frame, in the mixed light as it is then
     w.do(
-        "scene.frame_start, scene.frame_end = 1, 2; bright = next(n for n in "
+        "scene.frame_start = scene.frame_end = 2; bright = next(n for n in "
         "scene.world.node_tree.nodes if n.type == 'BACKGROUND').inputs['Strength']; "
         "bright.keyframe_insert('default_value', frame=1); bright.default_value = 0.25; "
         "bright.keyframe_insert('default_value', frame=2)"
     )
     work(w, "capture_frames")
     work(w, "relight_frames")
-    seen = []
-    for frame in (1, 2):
-        w.do(f"scene.frame_set({frame})")
-        w.wait(f"{TOLD} == 'ready'")
-        seen.append(shown(w, "ARTO Relit Frames"))
-    assert (plate - seen[0]).mean() > 5 and (seen[0] - seen[1]).mean() > 20
+    w.do("scene.frame_set(2)")
+    w.wait(f"{TOLD} == 'ready'")
+    assert (plate - shown(w, "ARTO Relit Frames")).mean() > 30
     w.do("scene.frame_set(1); scene.world = bpy.data.worlds[world]")
 
     # Delete: what relighting reads stays
@@ -273,6 +269,35 @@ def test_what_the_buttons_do_with_a_shot(walk: Walk) -> None:
     w.wait(f"{TOLD} == 'other'")
     press(w, "adopt")
     w.wait(f"{TOLD} == 'ready'")
-    work(w, "relight")
-    assert np.abs(shown(w, "ARTO Relit") - plate).mean() < 6
     assert "Traceback" not in w.printed
+
+
+OFF_AND_ON = """
+import addon_utils
+name = next(a.module for a in bpy.context.preferences.addons if a.module.endswith(".arto"))
+addon_utils.{0}(name)
+for area in bpy.context.window_manager.windows[0].screen.areas:
+    area.tag_redraw()
+"""
+
+
+@pytest.mark.skipif("ARTO_IDLE" not in os.environ, reason="ARTO_IDLE: for so many seconds")
+def test_a_window_left_alone_beside_one_without_arto(walk: Walk, capsys) -> None:
+    """A captured shot in the panels takes at most 1% of a core more than the same window without
+    ARTO. What the test's own driver takes is in both."""
+    w, seconds = walk.w, float(os.environ["ARTO_IDLE"])
+    shares = []
+    for turn in ("enable", "disable", "enable", "disable"):
+        w.do(OFF_AND_ON.format(turn))
+        if turn == "enable":
+            w.wait(TAB)
+        time.sleep(5)
+        before, begun = w.seconds, time.monotonic()
+        time.sleep(seconds)
+        shares.append((w.seconds - before) / (time.monotonic() - begun))
+    w.do(OFF_AND_ON.format("enable"))
+    more = (shares[0] + shares[2] - shares[1] - shares[3]) / 2
+    with capsys.disabled():
+        said = ", ".join(f"{share:.2%}" for share in shares)
+        print(f"\nof a core, with ARTO, without, with, without: {said}; {more:+.2%} with it")
+    assert more < 0.01

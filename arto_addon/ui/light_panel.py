@@ -35,6 +35,7 @@ class LightPanel(Draws):
         if world is None:
             say(column, context, "The scene has no world", "ERROR")
             column.operator("arto.open_hdri", icon="FILE_FOLDER")
+            strip.draw(column, context, None)
             draw_kit(column, context, None)
             if live.trouble:
                 say(column, context, sentence(live.trouble), "ERROR")

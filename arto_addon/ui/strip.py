@@ -24,7 +24,9 @@ WAIT = 0.5
 FROM = "arto_asset"
 
 
-def draw(column: bpy.types.UILayout, context: bpy.types.Context, world: bpy.types.World) -> None:
+def draw(
+    column: bpy.types.UILayout, context: bpy.types.Context, world: bpy.types.World | None
+) -> None:
     """Draw a row of thumbnails. A click on the name below one lights the scene with it."""
     if not bpy.app.background:
         shelf.look(lambda: None)
@@ -36,7 +38,7 @@ def draw(column: bpy.types.UILayout, context: bpy.types.Context, world: bpy.type
     switch = context.window_manager.arto
     first = min(switch.strip, (len(items) - 1) // ACROSS) * ACROSS
     shown = [*items[first : first + ACROSS]]
-    now = _shown_by(world)
+    now = _shown_by(world) if world else None
     row = column.row(align=True)
     if len(items) > ACROSS:
         _turn(row, "TRIA_LEFT", -1, first > 0)
