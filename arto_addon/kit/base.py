@@ -126,6 +126,17 @@ def _nodes(tree: bpy.types.NodeTree, prefix: str) -> dict[str, bpy.types.Node]:
     return {part: node for part, node in found.items() if node is not None}
 
 
+def is_part(node: bpy.types.Node) -> bool:
+    """Whether a node is one of a base or a backdrop, and no HDRI."""
+    return any(node.name == f"{prefix} {part}" for prefix in (BASE, BACKDROP) for part in _PARTS
+               if part != "HDRI")  # fmt: skip
+
+
+def is_group(tree: bpy.types.NodeTree | None) -> bool:
+    """Whether a group is one of a kit's: a light, a blur or a gradient."""
+    return bool(groups.what(tree)) or groups.is_blur(tree) or groups.is_gradient(tree)
+
+
 def remove(tree: bpy.types.NodeTree, prefix: str) -> None:
     """Remove the nodes of a base or a backdrop."""
     for node in _nodes(tree, prefix).values():

@@ -23,6 +23,8 @@ VERSION = 1
 MARK = "arto_kit"
 PICTURE, BLUR, GRADIENT = "Picture", "BLUR", "GRADIENT"
 _BIG = 1e9
+# Before Python 3.12 an enumeration is not asked for a value by `in`.
+_KINDS, _BLENDS = {kind.value for kind in Kind}, {blend.value for blend in Blend}
 Socket = bpy.types.NodeSocket
 
 
@@ -76,7 +78,7 @@ def light_group(kind: Kind, blend: Blend) -> bpy.types.NodeTree:
 def what(tree: bpy.types.NodeTree | None) -> tuple[Kind, Blend] | None:
     """What lights of a group are; None for a group that is no light, or was changed inside."""
     said = _said(tree)
-    if said is None or said[0] not in Kind or said[1] not in Blend:
+    if said is None or said[0] not in _KINDS or said[1] not in _BLENDS:
         return None
     return Kind(said[0]), Blend(said[1])
 

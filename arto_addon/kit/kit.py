@@ -24,10 +24,10 @@ from collections.abc import Iterator
 import bpy
 
 from ...core.errors import KitError
-from ...core.kit.light import Blend, Kind, Light
+from ...core.kit.light import Kind, Light
 from ...core.kit.model import Kit
 from ..blender.nodes import shader_tree, world_of_nodes
-from ..blender.reached import value_of
+from ..blender.reached import Around, value_of
 from . import base as of_base
 from . import groups
 from .base import DIRECTION, TURN, number, place_node, put
@@ -35,6 +35,7 @@ from .base import DIRECTION, TURN, number, place_node, put
 OUT, CAMERA, RAYS = "ARTO Kit", "ARTO Kit Camera", "ARTO Kit Rays"
 # The node whose colour multiplies all light is that of the slider *Tint* (`world.controls`).
 TINTED, TINT = "ARTO Kit Tinted", "ARTO Tint"
+_OWN = {DIRECTION, TURN, TINTED, TINT, OUT, CAMERA, RAYS}
 # What a light's node says beside its values.
 ON, SOLO, LOCK = "arto_on", "arto_solo", "arto_lock"
 
@@ -364,6 +365,16 @@ def is_whole(world: bpy.types.World) -> bool:
     return of_base.owns(tree, of_base.BASE, nodes[0].inputs["Under"] if nodes else _front(tree))
 
 
+def owns(node: bpy.types.Node, around: Around) -> bool:
+    """Whether a node is one of a kit's own, or stands in a group of a kit.
+
+    around: the group nodes around the node. The artist's nodes behind a kit are none of its own.
+    """
+    if any(of_base.is_group(group.node_tree) for group in around):
+        return True
+    return not around and (node.name in _OWN or of_base.is_part(node))
+
+
 def turns(world: bpy.types.World) -> bpy.types.Node | None:
     """The mapping node that turns all light of a world; None where it is not all the kit's."""
     if not is_whole(world):
@@ -376,9 +387,3 @@ def turns(world: bpy.types.World) -> bpy.types.Node | None:
     )
     plain = not any(place) and not any(rotation[:2]) and all(s == 1 for s in scale)
     return node if plain and node.vector_type == "POINT" and not node.mute else None
-
-
-__all__ = [
-    "DIRECTION", "LOCK", "ON", "OUT", "SOLO", "TURN", "Blend", "has", "is_light", "is_whole",
-    "light_of", "node_of", "nodes_of", "out_of", "put_in", "read", "turns", "why_not", "write",
-]  # fmt: skip

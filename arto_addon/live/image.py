@@ -13,8 +13,40 @@ from ..blender.markers import camera_of
 from ..blender.pictures import of_name, put
 from ..plate import plate
 from ..plate.names import relit_file
+from ..world.bake import sees_the_camera
 
 IMAGE = "ARTO Live"
+
+
+class Seen:
+    """Whether the camera sees another world than lights the scene, whose map is then not shown.
+
+    The answer is kept by the key of the world.
+    """
+
+    def __init__(self) -> None:
+        self._last = "", False
+
+    def apart(self, world: bpy.types.World | None, key: str) -> bool:
+        """Whether the camera sees another world. key: of what the world shows."""
+        if self._last[0] != key:
+            self._last = key, world is not None and sees_the_camera(world)
+        return self._last[1]
+
+    def view(
+        self,
+        scene: bpy.types.Scene,
+        clear: bool,
+        world: bpy.types.World | None,
+        key: str,
+        shape: tuple[int, int],
+        region: Region,
+    ) -> NDArray[np.float32] | None:
+        """What `view_of` gives; None where the map of the world is not seen behind the scene.
+
+        clear: whether the film is transparent.
+        """
+        return None if clear or self.apart(world, key) else view_of(scene, shape, region)
 
 
 def view_of(

@@ -38,7 +38,7 @@ from ..world.check import check_world, world_of
 from ..world.kept import shows
 from ..world.own import gains_of
 from . import maps
-from .image import push, put_away, seen, show_plate, view_of
+from .image import Seen, push, put_away, seen, show_plate
 from .line import FINISHED_LINE, lacking, line
 from .quick import Quick
 from .viewer import Viewer, Wish
@@ -73,7 +73,7 @@ class Live:
         self.written = (self.folder / "field.json").stat().st_mtime_ns
         fields = [take.field for take in shown.takes]
         self.viewer = Viewer(Preview(fields, holds_out(scene, self.layer)))
-        self.maps, self.quick = maps.Maps(), Quick()
+        self.maps, self.quick, self._seen = maps.Maps(), Quick(), Seen()
         self.shape = shown.field.shape
         # outside this render region a picture is empty
         self.region = shown.field.region
@@ -230,7 +230,7 @@ class Live:
         if wished != self._wished:
             self._wished = wished
             gains = gains_of(scene)
-            view = None if light.clear else view_of(scene, self.shape, self.region)
+            view = self._seen.view(scene, light.clear, world, key, self.shape, self.region)
             self.behind = light.clear or view is not None
             self.viewer.wish(Wish(image, strength, turn, light.own, gains, wished.whole, view))
         if light.finish and not self.finished and rest > FINISHED and self.settled:

@@ -110,7 +110,7 @@ def _of_kit(world: bpy.types.World) -> int:
         found = kit.read(world)
     except KitError:  # nodes work out a value
         return FINEST
-    widest = _GRADIENT
+    widest = _GRADIENT if found.base.kind is BaseKind.GRADIENT else 1
     if found.base.kind is BaseKind.HDRI:
         size = base.image_of(found.base.image).size[0] if found.base.image else 0
         # Every look-up of a blurred HDRI is another direction.
@@ -132,13 +132,14 @@ def detail(world: bpy.types.World) -> int:
     smallest light. Any other node that depends on
     a direction may draw anything, so it counts as `FINEST`.
     """
-    if kit.is_whole(world):
-        return min(_of_kit(world), FINEST)
-    widest = 1
+    lights = kit.has(world)
+    widest = _of_kit(world) if lights else 1
+    if lights and kit.is_whole(world):
+        return min(widest, FINEST)
     textures = frozenset({"ShaderNodeTexEnvironment", "ShaderNodeTexSky"})
     for node, around in reached_places(world):
         kind = node.bl_idname
-        if node.outputs and not gives(node):
+        if (node.outputs and not gives(node)) or (lights and kit.owns(node, around)):
             continue
         if kind == "ShaderNodeTexEnvironment":
             widest = max(widest, _of_texture(node, around))
@@ -149,8 +150,8 @@ def detail(world: bpy.types.World) -> int:
         elif kind in _STRUCTURE:
             continue
         elif not _is_value(node) or any(
-            not _is_value(n) and n.bl_idname not in textures
-            for n, _ in above(node, around, textures)
+            not _is_value(n) and n.bl_idname not in textures and not (lights and kit.owns(n, at))
+            for n, at in above(node, around, textures)
         ):
             return FINEST
     return min(widest, FINEST)

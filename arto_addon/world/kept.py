@@ -157,7 +157,7 @@ def _of_kit(scene: bpy.types.Scene, world: bpy.types.World) -> tuple[str, float,
     if any(image.source not in {"FILE", "GENERATED"} for image in images):
         return None
     plain = replace(kit, lights=kit.lit, backdrop=None, turn=0.0, strength=1.0)
-    of: list[object] = ["kit", plain, of_textures(scene)]
+    of: list[object] = ["kit", plain, kit.backdrop is not None, of_textures(scene)]
     of += [(digest_of(image), image.colorspace_settings.name) for image in images]
     return repr(of), kit.strength, math.radians(kit.turn) % (2 * math.pi)
 

@@ -148,3 +148,17 @@ def test_mixed_shaders_are_refused(world: bpy.types.World) -> None:
     tree.links.new(mix.outputs[0], tree.get_output_node("CYCLES").inputs[0])
     with pytest.raises(KitError, match="mixes shaders"):
         kits.put_in(world)
+
+
+def test_nodes_around_a_kit_are_as_fine_as_they_are(world: bpy.types.World) -> None:
+    """A node that only changes colours has no detail of its own; a texture behind a kit has."""
+    kits.write(world, Kit((Light("a", Kind.ROUND, width=2.0, height=2.0),)))
+    tree, out = world.node_tree, kits.out_of(world)
+    assert out is not None and detail(world) == 360
+    hue = tree.nodes.new("ShaderNodeHueSaturation")
+    tree.links.new(out.inputs["Color"].links[0].from_socket, hue.inputs["Color"])
+    tree.links.new(hue.outputs[0], out.inputs["Color"])
+    assert not kits.is_whole(world) and detail(world) == 360
+    noise = tree.nodes.new("ShaderNodeTexNoise")
+    tree.links.new(noise.outputs[0], kits.nodes_of(world)[0].inputs["Under"])
+    assert detail(world) == FINEST
