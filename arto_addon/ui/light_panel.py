@@ -104,7 +104,9 @@ def lamps_line(scene: bpy.types.Scene) -> str:
     except (ArtoError, OSError):
         return ""
     found = str(header.get("arto.lamps", ""))
-    return tr("Suns: {found}", found=found) if found and found != "no" else "This light has no suns"
+    if found and found != "no":
+        return tr("Suns in the last picture: {found}", found=found)
+    return "The last picture had no suns"
 
 
 def _own(column: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -137,8 +137,8 @@ Recent HDRIs | Letzte HDRIs | 最近のHDRI
 What relighting reads | Was das Licht braucht | リライトが読むもの
 This Blender was built without Open Image Denoise | Diesem Blender fehlt Open Image Denoise | このBlenderにはOpen Image Denoiseがありません
 The folder cannot be read: | Der Ordner ist nicht lesbar: | フォルダーを読めません:
-Suns: {found} | Sonnen: {found} | 太陽: {found}
-This light has no suns | Dieses Licht hat keine Sonnen | この光に太陽はありません
+Suns in the last picture: {found} | Sonnen im letzten Bild: {found} | 前回の画像の太陽: {found}
+The last picture had no suns | Das letzte Bild hatte keine Sonnen | 前回の画像に太陽はありません
 Compares the picture with a few samples of a render | Vergleicht das Bild mit wenigen Samples eines Renders | 画像を少数サンプルのレンダーと比べます
 The camera has moved since | Die Kamera hat sich seither bewegt | カメラが動きました
 Captured of the view layer {then}, this is {now} | Aufgenommen vom View-Layer {then}, dies ist {now} | ビューレイヤー {then} でキャプチャ、現在は {now}
