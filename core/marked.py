@@ -175,7 +175,16 @@ def kind_of(folder: Path) -> Kind | None:
 
 
 def around(path: Path) -> Path | None:
-    """Find the folder of ARTO's that a path is in, or is: what is in it goes with it."""
+    """Find the folder of ARTO's that a path is in, or is: what is in it goes with it.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    Path or None
+    """
     whole = Path(os.path.realpath(path))
     return next((folder for folder in (whole, *whole.parents) if kind_of(folder)), None)
 

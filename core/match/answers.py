@@ -4,6 +4,15 @@ The light of a pixel is linear in the radiance of the cells. So the field is a m
 row is a cell's picture, and a column says where a pixel's light comes from. The columns are all
 pixels of a small proxy, and those pixels of a finer one that mirrors and clear things fill: these
 see the light as finely as the picture does.
+
+Examples
+--------
+Two pixels of a small proxy, and one that mirrors of a proxy four times as fine:
+
+>>> from types import SimpleNamespace as Proxy
+>>> small, values = Proxy(shape=(1, 2)), np.zeros((3, 5, 3), np.float32)
+>>> Answers(None, values, small, small, (8, 2), np.array([7]), np.ones(3)).sizes.tolist()
+[1.0, 1.0, 0.0625]
 """
 
 from __future__ import annotations

@@ -24,7 +24,14 @@ DARKEST = 0.05
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a region's light: its name, and its share, 0 to 1."""
+    """A part of a region's light.
+
+    Parameters
+    ----------
+    name : str
+    share : float
+        Of the region's light, 0 to 1.
+    """
 
     name: str
     share: float

@@ -4,6 +4,11 @@ What is minimised is the error of each pixel relative to its light, without the 
 that no light can match, plus two pulls. One holds each cell to the present light; the other holds
 neighbouring cells together where the picture says nothing, and lets go at the rims of windows and
 suns.
+
+Examples
+--------
+>>> [float(f"{pull_of(near):.1e}") for near in (0.0, 0.5, 1.0)]
+[1e-05, 0.01, 10.0]
 """
 
 from __future__ import annotations
@@ -70,7 +75,18 @@ class Matched:
 
 
 def pull_of(near: float) -> float:
-    """How strongly a slider from 0, faithful, to 1, near, holds to the present light."""
+    """Say how strongly a slider holds to the present light.
+
+    Parameters
+    ----------
+    near : float
+        From 0, faithful to the target, to 1, near to the present light.
+
+    Returns
+    -------
+    float
+        The weight of the pull.
+    """
     return FAITHFUL * (NEAR / FAITHFUL) ** float(np.clip(near, 0, 1))
 
 
