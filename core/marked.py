@@ -174,21 +174,6 @@ def kind_of(folder: Path) -> Kind | None:
     return None
 
 
-def around(path: Path) -> Path | None:
-    """Find the folder of ARTO's that a path is in, or is: what is in it goes with it.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    Path or None
-    """
-    whole = Path(os.path.realpath(path))
-    return next((folder for folder in (whole, *whole.parents) if kind_of(folder)), None)
-
-
 def remove(folder: Path, kind: Kind, inside: Path) -> None:
     """Remove a folder that ARTO has made, with all that is in it.
 

@@ -54,7 +54,9 @@ def check_outside(path: Path, what: str) -> None:
 
     what: is to be written there, for the message.
     """
-    if folder := marked.around(path):
+    whole = path.resolve()
+    folder = next((up for up in (whole, *whole.parents) if marked.kind_of(up)), None)
+    if folder:
         raise SceneError(
             f"{path} lies in {folder}, a folder of ARTO's that is removed with all that is in it: "
             f"choose another place for {what}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 from arto.arto_addon import work
@@ -11,11 +12,10 @@ from arto.arto_addon.farm.plan import plan
 from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.relight import ahead, many
 from arto.arto_addon.relight.shown import Shown
-from arto.arto_addon.shot import paths, status
+from arto.arto_addon.shot import home, paths, status
 from arto.arto_addon.ui import cli, report, state
 from arto.arto_addon.ui.inventory import inventory
 from arto.arto_addon.ui.options import parser
-from arto.core import marked
 from arto.core.errors import FilesError, SceneError, ShotError
 from arto.core.marked import MARK
 from arto.core.signed import parsed, text_of
@@ -44,8 +44,9 @@ def test_nothing_is_put_into_a_folder_that_arto_removes(shot, tmp_path, monkeypa
         work.run(plan(shot, layer, field.parent / "capture" / "job", None, 1, 1))
     with pytest.raises(report.OptionError, match="removed with all that is in it"):
         report.check_file(field / "report.json", report.FORMAT)
-    assert marked.around(field / "a" / "b") == field.resolve()
-    assert marked.around(tmp_path / "a") is None
+    with pytest.raises(SceneError, match=re.escape(f"lies in {field.resolve()}, a folder of")):
+        home.check_outside(field / "a" / "b", "it")
+    home.check_outside(tmp_path / "a", "it")
 
 
 def test_a_report_takes_no_name_of_arto(tmp_path):
