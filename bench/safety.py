@@ -19,7 +19,7 @@ from typing import Any
 
 from arto.core.errors import ArtoError
 
-from . import safety_damages, safety_kills, safety_others
+from . import safety_damages, safety_kills, safety_others, safety_pictures
 
 SECONDS, BYTES = 1.0, 200 << 20
 # A piece of work, and whether its result is right.
@@ -33,6 +33,7 @@ TYPED = (ArtoError, safety_damages.DamagedError)
 KINDS: dict[str, Callable[[Path], Cases]] = {
     **safety_damages.KINDS,
     **safety_others.KINDS,
+    **safety_pictures.KINDS,
     **safety_kills.KINDS,
 }
 

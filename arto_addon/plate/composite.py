@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Mapping
 from pathlib import Path
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.errors import SceneError
+from ...core import checksum, exr, signed
+from ...core.errors import ArtoError, SceneError
+from ...core.file_names import folded
 from ...core.files import whole
+from ...core.values import Values
 from ..blender.compositing import OUTPUT, composited, compositor, own_compositor
 from ..blender.pictures import put
+from ..shot import paths
 from ..work import Progress, Steps
 from .names import relit_file
 
 COMPOSITE = "ARTO Composite"
+# In ARTO's folder: what was written, and the attribute of the key in the header of a plate.
+NOTES, KEY = "composites.json", "arto.light key"
 
 
 def composite_file(scene: bpy.types.Scene) -> Path:
@@ -43,6 +51,12 @@ def save_composite(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
             "in Compositor to Instead of the Render, or press F12"
         )
     path = composite_file(scene)
+    there = path.exists() and not path.is_symlink() and path.stat().st_size > 0
+    if there and not scene.arto.overwrite and not said_of(scene):
+        raise SceneError(
+            f"{path} is there, and it is not what ARTO wrote: choose another output, or move it "
+            "away (Write Over Other Files writes over it)"
+        )
     yield Progress(0.1, "compositing")
     picture = _composited(scene)
     if bad := int((~np.isfinite(picture)).any(axis=-1).sum()):
@@ -54,12 +68,43 @@ def save_composite(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
     try:
         with whole(path) as partial:
             image.save_render(str(partial), scene=scene)
+        _note(scene, path)
     except (OSError, RuntimeError) as e:
         raise SceneError(f"{path} cannot be written ({e})") from e
     finally:
         bpy.data.images.remove(image)
     yield Progress(1.0, f"wrote {path}")
     return path
+
+
+def said_of(scene: bpy.types.Scene) -> Mapping[str, object]:
+    """What was noted of the scene's composite; empty where it is missing, or not as it was written.
+
+    `plate` is the key of the plate that it was made of. Other formats than EXR have no room for
+    such notes, so they are in a file in ARTO's folder.
+    """
+    path = composite_file(scene)
+    noted = _notes(scene).get(folded(path), {})
+    with contextlib.suppress(OSError):
+        if isinstance(noted, dict) and noted.get("sum") == checksum.of_file(path):
+            return noted
+    return {}
+
+
+def _notes(scene: bpy.types.Scene) -> dict[str, object]:
+    path = paths.worlds_folder(scene).with_name(NOTES)
+    with contextlib.suppress(ArtoError):
+        if path.is_file():
+            return Values(path, SceneError).kind("files", dict, {})
+    return {}
+
+
+def _note(scene: bpy.types.Scene, path: Path) -> None:
+    """Note what was written, and of which plate. Raises OSError."""
+    plate = relit_file(scene)
+    key = exr.header(plate).get(KEY, "") if plate.is_file() else ""
+    noted = _notes(scene) | {folded(path): {"sum": checksum.of_file(path), "plate": str(key)}}
+    signed.write(paths.worlds_folder(scene).with_name(NOTES), {"files": noted})
 
 
 def _composited(scene: bpy.types.Scene) -> NDArray[np.float32]:

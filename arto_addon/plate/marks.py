@@ -97,6 +97,6 @@ def check(path: Path, plate: Path, overwrite: bool) -> None:
         return
     if why := in_the_way(path, plate):
         raise SceneError(
-            f"{why}: choose another output, or move the file away (Write Over, --overwrite, "
-            "writes over it)"
+            f"{why}: choose another output, or move the file away (Write Over Other "
+            "Files, --overwrite, writes over it)"
         )

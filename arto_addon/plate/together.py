@@ -14,7 +14,7 @@ from types import TracebackType
 
 from ...core import exr, marked
 from ...core.errors import ExrError
-from ...core.files import whole
+from ...core.files import in_turn, whole
 from . import marks
 from .marks import ENDINGS, SCRIPTS, is_of
 from .plate import LAYERS, full_file, layers_prefix
@@ -68,13 +68,17 @@ class Together:
         at: TracebackType | None,
     ) -> None:
         try:
-            if error is None:
-                self._remove_others()
-            self._held.__exit__(kind, error, at)
+            # in turn: of two relights of one plate, all files of the later one stay
+            with in_turn(self.plate.parent):
+                if error is None:
+                    self._remove_others()
+                self._held.__exit__(kind, error, at)
         except OSError as e:
             raise _cannot(self.plate, e) from e
 
     def _remove_others(self) -> None:
+        if (prefix := older_prefix(self.plate)) is not None:  # of a relight that came meanwhile
+            self._prefixes.add(prefix)
         for path in beside(self.plate, self._prefixes):
             same = any(path.name.casefold() == there.name.casefold() for there in self.written)
             if not same and marked.remove_own_file(path, lambda path: is_of(path, self.plate)):

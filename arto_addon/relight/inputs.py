@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import re
+import unicodedata
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import SceneError
-from ...core.file_names import folded
+from ...core.file_names import folded, same_file
 from ..blender import sequences
 from ..plate.footage import footage
 from ..plate.marks import is_marked
@@ -49,7 +50,7 @@ class Inputs:
         for one in inputs:
             if one.form:
                 key = folded(one.path.parent), one.form
-                self._forms.setdefault(key, (re.compile(one.form, re.IGNORECASE), one))
+                self._forms.setdefault(key, (re.compile(_composed(one.form), re.IGNORECASE), one))
                 continue
             self._named.setdefault(folded(one.path), one)
             if found := _node(one.path):
@@ -60,13 +61,18 @@ class Inputs:
         here = _node(path)
         if here in self._same:
             return self._same[here]
-        if (one := self._named.get(folded(path))) and not (here and _node(one.path)):
+        if (one := self._named.get(folded(path))) and same_file(one.path, path):
             return one
         parent = folded(path.parent)
         for (folder, _), (form, one) in self._forms.items():
-            if folder == parent and form.fullmatch(path.name):
+            if folder == parent and form.fullmatch(_composed(path.name)):
                 return one
         return None
+
+
+def _composed(name: str) -> str:
+    """A name as every disk that tells no accents apart would have it."""
+    return unicodedata.normalize("NFC", name)
 
 
 def _node(path: Path) -> tuple[int, int] | None:

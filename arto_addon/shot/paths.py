@@ -291,6 +291,7 @@ def claim(scene: bpy.types.Scene, view_layer: str, together: Sequence[int] = ())
     together: the frames that are captured as one sequence, to be noted down. Raises SceneError.
     """
     root, folder = _root(scene), place(scene, view_layer).folder
+    home.check_outside(folder.parent, "captures")
     there = _shot_in(folder)
     if scene_ids.of(scene) is None:
         # The shot's names led here, or the folder is new.

@@ -120,6 +120,21 @@ def _nearest(scene: bpy.types.Scene, view_layer: str | None, place: Place) -> Sh
     return found
 
 
+_alike: dict[Path, tuple[float, Path | None]] = {}
+
+
+def alike(scene: bpy.types.Scene, view_layer: str) -> Path | None:
+    """Captures of a scene of this name in another file, see `paths.alike`; asked now and then."""
+    place = _place(scene, view_layer)
+    if place is None:
+        return None
+    at, found = _alike.get(place.folder, (-10.0, None))
+    if bpy.app.background or time.monotonic() - at > 3:
+        found = paths.alike(scene, view_layer)
+        _alike[place.folder] = time.monotonic(), found
+    return found
+
+
 def caution_line(scene: bpy.types.Scene, view_layer: str | None = None) -> Line | None:
     """Say what the check of the light found before the capture; None where it found nothing."""
     place = _place(scene, view_layer)

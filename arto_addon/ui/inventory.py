@@ -5,6 +5,7 @@ All files are read and compared with their checksums, where they have some.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,8 +23,8 @@ from ...core.field.proxy import FACTORS
 from ...core.field.tile_file import TileFile
 from ...core.shot import Shot
 from ..capture.sequence import frame_kept
-from ..plate import plate
-from ..plate.marks import is_of
+from ..plate import composite, plate
+from ..plate.marks import SCRIPTS, is_of
 from ..plate.together import beside, older_prefix
 from ..relight import ahead
 from ..relight.light_key import HEADER, light_key
@@ -213,7 +214,7 @@ def _of_plate(scene: bpy.types.Scene, view_layer: str, path: Path) -> Iterator[T
     except ArtoError as e:
         yield Thing("plate", path, "damaged", str(e))
         return
-    world, field = world_of(scene, view_layer), status.field_of(_source(scene, view_layer))
+    world, field = world_of(scene, view_layer), _field_of(scene, view_layer)
     key = head.get(HEADER)
     same = field is None or world is None or key == light_key(scene, world, view_layer, field)
     yield Thing("plate", path, "whole" if same else "outdated")
@@ -225,16 +226,26 @@ def _of_plate(scene: bpy.types.Scene, view_layer: str, path: Path) -> Iterator[T
     others = [p for p in beside(path, {prefix} if prefix is not None else set()) if is_of(p, path)]
     for other in sorted({*expected, *others}):
         yield _beside(path, other, key)
+    if noted := composite.said_of(scene):
+        of_now = noted.get("plate") == key
+        why = "" if of_now else "it is of an earlier plate"
+        there = composite.composite_file(scene)
+        yield Thing("composite", there, "whole" if of_now else "outdated", why)
 
 
-def _source(scene: bpy.types.Scene, view_layer: str) -> Path:
-    return paths.place(scene, view_layer).source
+def _field_of(scene: bpy.types.Scene, view_layer: str) -> Field | None:
+    """The shot's field; None where it is missing or damaged, or nobody knows whose it is."""
+    with contextlib.suppress(ShotError):
+        return status.field_of(paths.place(scene, view_layer).source)
+    return None
 
 
 def _beside(path: Path, other: Path, key: object) -> Thing:
     kind = other.stem.removeprefix(path.stem).lstrip("_").replace("_", " ")
     if not other.is_file():
         return Thing(kind, other, "missing")
+    if other.suffix in SCRIPTS:  # that it is ARTO's own says that it is as it was written
+        return Thing(f"script {other.suffix}", other, "whole")
     try:
         exr.whole_parts(other)
         if exr.header(other).get(HEADER, key) != key:

@@ -19,7 +19,7 @@ from ..blender.markers import camera_of
 from ..capture import planes
 from ..capture.capture import capture
 from ..capture.planned import guess
-from ..capture.sequence import capture_frames
+from ..capture.sequence import capture_frames, frame_kept
 from ..fit.fit import fit
 from ..job import session
 from ..plate.names import relit_file
@@ -27,7 +27,7 @@ from ..relight.back import mix_to_scene
 from ..relight.many import frames_of, relight_frames
 from ..relight.relight import relight
 from ..shot import paths, watch
-from ..shot.adopting import adopt
+from ..shot.adopting import adopt, adopt_from
 from ..shot.shot import layer_of
 from ..stage.bounds import scene_bounds
 from ..stage.stage import stage
@@ -313,9 +313,19 @@ class ARTO_OT_adopt(Quick):
         scene, layer = context.scene, layer_of(context.scene)
         place = paths.place(scene, layer)
         if not place.owner:
-            raise SceneError("there is nothing of another file or scene to use here")
+            return self._alike(scene, layer)
         folder = adopt(scene, layer, place.source)
         return f"what was captured for {place.owner} is used here too, in {folder}"
+
+    @staticmethod
+    def _alike(scene: bpy.types.Scene, layer: str) -> str:
+        """Use what was captured of a scene of this name in another file."""
+        other = paths.alike(scene, layer)
+        if other is None:
+            raise SceneError("there is nothing of another file or scene to use here")
+        with frame_kept(scene):
+            frames = [frame for frame, _ in adopt_from(scene, layer, other)]
+        return f"what is in {other} is used here too, of {len(frames)} frames"
 
 
 def own_place(scene: bpy.types.Scene) -> paths.Place:

@@ -18,7 +18,7 @@ from ..blender.markers import camera_of
 from ..blender.words import tr
 from ..capture.asked import key_of_settings
 from ..capture.planned import most
-from ..shot import paths, status
+from ..shot import home, paths, status
 from ..shot.shot import check_same_shot, layer_of, shot_of
 from ..stage.settings import samples_of
 from ..stage.stage import picture_region
@@ -83,6 +83,9 @@ def _told(
         lines = tr("{tiles} done,", tiles=tiles), "continues where it stopped"
         return Told("unfinished", lines, "Continue")
     if field_line is None and capture_line is None:
+        if other := status.alike(scene, layer):
+            whose = tr("Of a scene of this name: {folder}", folder=home.relative(other))
+            return Told("other", ("No capture yet", whose), "Capture")
         return Told("none", ("No capture yet",), "Capture")
     if field_line is None and not (place.source / "capture").exists():
         then = paths.nearest(scene, layer)

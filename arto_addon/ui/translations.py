@@ -91,6 +91,7 @@ Relit Picture | Neu beleuchtetes Bild | リライト画像
 No capture yet | Noch keine Aufnahme | まだキャプチャがありません
 The scene has no camera | Die Szene hat keine Kamera | シーンにカメラがありません
 The scene has no world | Die Szene hat keine Welt | シーンにワールドがありません
+Of a scene of this name: {folder} | Von einer Szene dieses Namens: {folder} | 同名のシーンのもの: {folder}
 A file of the shot is damaged: | Eine Datei der Einstellung ist beschädigt: | ショットのファイルが破損しています:
 This file was never saved: | Die Datei wurde nie gespeichert: | このファイルは未保存です:
 save it first | erst speichern | 先に保存してください

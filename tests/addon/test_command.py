@@ -104,6 +104,7 @@ def test_the_status_says_what_is_there(shot, capsys):
     whole = {"capture": "whole", "field": "whole", "plate": "whole"}
     assert states(shot) == (3, whole | {"plate": "missing"})
     assert cli.main(["relight", "--layers", "FACES"]) == 0
+    whole |= {f"script {ending}": "whole" for ending in (".nk", ".comp")}
     assert states(shot) == (0, whole | {"layers": "whole"})
     path = relit_file(shot)
     layers = plate.layers_file(path)

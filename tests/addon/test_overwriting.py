@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import os
+import threading
 import unicodedata
 
 import bpy
 import numpy as np
 import pytest
 from arto.arto_addon import work
-from arto.arto_addon.plate import marks
+from arto.arto_addon.plate import composite, marks
 from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.plate.together import Together
 from arto.arto_addon.relight import many, relight
 from arto.arto_addon.relight.inputs import Input, Inputs, inputs
+from arto.arto_addon.ui.inventory import inventory
 from arto.core import exr
-from arto.core.errors import SceneError
+from arto.core.errors import BusyError, SceneError
 from arto.core.file_names import same_file
+from arto.core.files import in_turn
 
 
 def picture(path, value=1.0):
@@ -133,11 +136,65 @@ def test_names_that_disks_take_for_one_are_one(tmp_path):
     name = "Café.exr"
     one = tmp_path / unicodedata.normalize("NFC", name)
     other = tmp_path / unicodedata.normalize("NFD", name.upper())
-    read = Inputs([Input("a map", one), Input("a sequence", tmp_path / "s_01.exr", r"s_\d+\.exr")])
-    assert same_file(one, other) and read.over(other) and read.over(tmp_path / "S_12.EXR")
+    sequence = Input("a sequence", tmp_path / "s\u00e9_01.exr", "s\u00e9_\\d+\\.exr")
+    read = Inputs([Input("a map", one), sequence])
+    assert same_file(one, other) and read.over(other) and read.over(tmp_path / "Se\u0301_12.EXR")
     picture(one)
     if not other.exists():  # this disk tells them apart, and both are there
         picture(other)
         assert not same_file(one, other) and not read.over(other)
     os.link(one, tmp_path / "linked.exr")
     assert Inputs([Input("a map", one)]).over(tmp_path / "linked.exr")
+
+
+def test_files_of_a_plate_take_their_places_in_turn(tmp_path):
+    """Of two relights of one plate the later one has all of its files, and only these."""
+    plate, layers = tmp_path / "a.exr", tmp_path / "a_layers.exr"
+
+    def written(together, *paths):
+        for path in paths:
+            with together.file(path) as partial:
+                exr.write(partial, {"": np.ones((2, 2, 4), np.float32)}, {marks.PLATE: plate.name})
+
+    with in_turn(tmp_path, 0.05):
+        with pytest.raises(BusyError), in_turn(tmp_path, 0.05):
+            pass
+        together = Together(plate, None)
+        together.__enter__()
+        written(together, plate, layers)
+        ended = threading.Thread(target=lambda: together.__exit__(None, None, None))
+        ended.start()
+        ended.join(0.1)
+        assert ended.is_alive() and not plate.exists() and not layers.exists()
+        other = Together(plate, None)
+        other.__enter__()
+        written(other, plate)
+    ended.join()
+    assert plate.exists() and layers.exists()
+    other.__exit__(None, None, None)
+    assert plate.exists() and not layers.exists()
+
+
+def test_a_composite_of_somebody_else_stays_and_an_older_one_is_told(shot, there, monkeypatch):
+    path = composite.composite_file(shot)
+    path.write_bytes(b"painted over")
+    monkeypatch.setattr(composite, "_renders", lambda _: "")
+    monkeypatch.setattr(composite, "compositor", lambda _: object())
+    monkeypatch.setattr(composite, "_composited", lambda _: np.ones((4, 4, 4), np.float32))
+    layer = shot.view_layers[0].name
+    with pytest.raises(SceneError, match="not what ARTO wrote"):
+        work.run(composite.save_composite(shot, layer))
+    assert path.read_bytes() == b"painted over" and not composite.said_of(shot)
+    path.unlink()
+    work.run(relight.compute(shot, layer))
+    for _ in range(2):  # the second goes over the first
+        work.run(composite.save_composite(shot, layer))
+    states = {t.kind: t.state for t in inventory(shot, layer, None).frames[0].things}
+    assert states["composite"] == "whole"
+    shot.arto.own_lamps = 0.5
+    try:
+        work.run(relight.compute(shot, layer))
+        states = {t.kind: t.state for t in inventory(shot, layer, None).frames[0].things}
+        assert (states["plate"], states["composite"]) == ("whole", "outdated")
+    finally:
+        shot.arto.own_lamps = 1.0

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 
+import bpy
 import pytest
 from arto.arto_addon import work
 from arto.arto_addon.capture import capture as captures
@@ -12,7 +14,7 @@ from arto.arto_addon.farm.plan import plan
 from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.relight import ahead, many
 from arto.arto_addon.relight.shown import Shown
-from arto.arto_addon.shot import home, paths, status
+from arto.arto_addon.shot import home, paths, scene_id, status
 from arto.arto_addon.ui import cli, report, state
 from arto.arto_addon.ui.inventory import inventory
 from arto.arto_addon.ui.options import parser
@@ -174,3 +176,23 @@ def test_a_field_of_others_is_found_before_the_capture(shot):
                 there.rmdir()
             else:
                 mark.write_text(before)
+
+
+def test_the_window_shows_captures_of_a_scene_of_this_name(shot, tmp_path):
+    """Of another file, which has no ID of this scene's."""
+    layer, own = shot.view_layers[0].name, shot.arto.scene_id
+    scene_id.give(shot, "another")
+    paths.forget()
+    before = status._alike.copy()
+    status._alike.clear()
+    try:
+        said = state.told(shot)
+        assert said.kind == "other" and "Camera_0001" in said.lines[1]
+        assert bpy.ops.arto.adopt() == {"FINISHED"}
+        assert Shown(shot, layer).field.about.shot.scene_id == "another"
+        assert state.told(shot).kind == "ready"
+    finally:
+        shutil.rmtree(paths.place(shot).folder)
+        status._alike.update(before)
+        scene_id.give(shot, own)
+        paths.forget()
