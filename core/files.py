@@ -35,7 +35,6 @@ __all__ = [
     "OLD",
     "PART",
     "Lock",
-    "in_turn",
     "is_writable",
     "moved",
     "replace_folder",
@@ -178,33 +177,6 @@ def replace_folder(complete: Path, folder: Path) -> None:
         raise
     # what is left of it is found and removed by the next one
     settle(folder)
-
-
-@contextlib.contextmanager
-def in_turn(folder: Path, patience: float = 60.0) -> Iterator[None]:
-    """Hold a folder while several files in it take their places, for one process at a time.
-
-    Where folders cannot be locked, as on Windows and on some disks of a network, nobody waits.
-
-    Parameters
-    ----------
-    folder : Path
-        Nothing is written into it.
-    patience : float
-        In seconds.
-
-    Raises
-    ------
-    BusyError
-        Another process holds the folder all the while.
-    """
-    handle: int | None = None
-    try:
-        handle = _held_folder(folder, patience)
-        yield
-    finally:
-        if handle is not None:
-            os.close(handle)
 
 
 class Lock:
@@ -355,36 +327,12 @@ if sys.platform == "win32":
     def _lock(handle: int, shared: bool) -> None:
         os.lseek(handle, _BYTE, os.SEEK_SET)
         msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
-
-    def _held_folder(folder: Path, patience: float) -> int | None:
-        return None
 else:
     import fcntl
 
     def _lock(handle: int, shared: bool) -> None:
         # who only looks asks for a share of it, for which a file that may be read is enough
         fcntl.flock(handle, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
-
-    def _held_folder(folder: Path, patience: float) -> int | None:
-        try:
-            handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-        except OSError:
-            return None
-        until = time.monotonic() + patience
-        while True:
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                return handle
-            except BlockingIOError:
-                if time.monotonic() > until:
-                    os.close(handle)
-                    raise BusyError(
-                        f"another process is putting files into {folder}: wait until it is done"
-                    ) from None
-            except OSError:  # a disk of a network that locks no folders
-                os.close(handle)
-                return None
-            time.sleep(0.02)
 
 
 def _lock_soon(handle: int, shared: bool = False) -> None:

@@ -14,7 +14,8 @@ from types import TracebackType
 
 from ...core import exr, marked
 from ...core.errors import ExrError
-from ...core.files import in_turn, whole
+from ...core.files import whole
+from ...core.places import in_turn
 from . import marks
 from .marks import ENDINGS, SCRIPTS, is_of
 from .plate import LAYERS, full_file, layers_prefix

@@ -13,8 +13,8 @@ from typing import TypeVar
 
 import bpy
 
-from ...core import marked
 from ...core.errors import SceneError
+from ...core.places import around
 
 _Block = TypeVar("_Block", bound=bpy.types.ID)
 _home: list[str] = []
@@ -54,9 +54,7 @@ def check_outside(path: Path, what: str) -> None:
 
     what: is to be written there, for the message.
     """
-    whole = path.resolve()
-    folder = next((up for up in (whole, *whole.parents) if marked.kind_of(up)), None)
-    if folder:
+    if folder := around(path):
         raise SceneError(
             f"{path} lies in {folder}, a folder of ARTO's that is removed with all that is in it: "
             f"choose another place for {what}"

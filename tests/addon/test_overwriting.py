@@ -19,7 +19,7 @@ from arto.arto_addon.ui.inventory import inventory
 from arto.core import exr
 from arto.core.errors import BusyError, SceneError
 from arto.core.file_names import same_file
-from arto.core.files import in_turn
+from arto.core.places import in_turn
 
 
 def picture(path, value=1.0):

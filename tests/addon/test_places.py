@@ -20,6 +20,7 @@ from arto.arto_addon.ui.inventory import inventory
 from arto.arto_addon.ui.options import parser
 from arto.core.errors import FilesError, SceneError, ShotError
 from arto.core.marked import MARK
+from arto.core.places import around
 from arto.core.signed import parsed, text_of
 
 
@@ -49,6 +50,8 @@ def test_nothing_is_put_into_a_folder_that_arto_removes(shot, tmp_path, monkeypa
     with pytest.raises(SceneError, match=re.escape(f"lies in {field.resolve()}, a folder of")):
         home.check_outside(field / "a" / "b", "it")
     home.check_outside(tmp_path / "a", "it")
+    assert around(field / "a" / "b") == field.resolve()
+    assert around(tmp_path / "a") is None
 
 
 def test_a_report_takes_no_name_of_arto(tmp_path):

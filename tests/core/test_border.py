@@ -93,10 +93,10 @@ def test_the_house_is_as_the_architecture_says() -> None:
 # module that stands alone is a room by itself. docs/architecture.md quotes both lists.
 FLOW = {
     "core": """errors < units < memory < regular < picture_files < checksum < before < marked
-    < files < arrays < signed < region < file_names < description < values < shot < metrics
-    < patterns < measure < faces < partition < hemicube < mix < exr < cryptomatte < capture < light
-    < kit < supports < field < fit < lights < relight < catcher < preview < inside < place < match
-    < verify""",
+    < files < places < arrays < signed < region < file_names < description < values < shot
+    < metrics < patterns < measure < faces < partition < hemicube < mix < exr < cryptomatte
+    < capture < light < kit < supports < field < fit < lights < relight < catcher < preview
+    < inside < place < match < verify""",
     "arto_addon": """interrupt < work < settings < blender < stage < shot < kit < world < plate
     < fit < capture < relight < match < shoot < job < live < farm < ui""",
 }
