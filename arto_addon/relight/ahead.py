@@ -32,8 +32,8 @@ from .shown import Shown, check_film
 NO_DENOISER = "no: this Blender was built without Open Image Denoise"
 GLASS = "opaque: what is seen through it is in it, whatever Transparent Glass says"
 TINTED = (
-    "tinted glass before a shadow catcher is not yet as in a render where the ground is seen "
-    "through it: compare it with one (Verify), or take its tint away"
+    "where the ground of a shadow catcher is seen through glass, a render over an opaque film "
+    "counts the glass twice, and is darker there: the relit picture counts it once"
 )
 PORTALS = (
     "what the world lights by way of a Ray Portal may have 2% less light than in a render, which "
