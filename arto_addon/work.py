@@ -16,7 +16,7 @@ from typing import TypeVar
 
 import bpy
 
-from ..core.errors import ArtoError, CancelledError, SceneError, StrictError
+from ..core.errors import ArtoError, CancelledError, DeviceMemoryError, SceneError, StrictError
 from . import interrupt
 
 STOPPED = "cancelled: finished parts of a capture are kept, run it again to go on"
@@ -63,10 +63,16 @@ class Render:
     share: float
     text: str
     span: float = 0.0  # the render's share of the whole work
-    state: str = field(default="waiting")  # then "done" or "cancelled"
+    state: str = field(default="waiting")  # then "done", "cancelled" or "no memory"
+    trouble: str = ""  # what Cycles said
 
     def check(self) -> None:
-        """Raise CancelledError unless the render was completed."""
+        """Raise CancelledError unless the render was completed; DeviceMemoryError without room."""
+        if self.state == "no memory":
+            raise DeviceMemoryError(
+                f"Cycles has not the memory for this render ({self.trouble}): close other programs,"
+                " lower Memory in ARTO's settings, or render on the CPU"
+            )
         if self.state != "done":
             raise CancelledError(STOPPED)
 
@@ -115,6 +121,9 @@ def blocking_render(request: Render) -> None:
         result = {"CANCELLED"}
     except RuntimeError as e:
         said = str(e).strip().rstrip(".")
+        if "memory" in said.lower():
+            request.state, request.trouble = "no memory", said
+            return
         raise SceneError(
             f"Cycles could not render: {said}. If the console says that a file could not be "
             "written, make room on the disk (or raise the limit: quota, ulimit -f)"

@@ -50,6 +50,10 @@ class SceneError(ArtoError):
     """A Blender scene that cannot be captured or relit as it stands."""
 
 
+class DeviceMemoryError(SceneError):
+    """A render for which the device that renders has not the memory."""
+
+
 class ShotError(ArtoError):
     """A text that is no description of a shot, or the description of another shot."""
 

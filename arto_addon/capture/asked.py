@@ -31,9 +31,10 @@ from ..stage.bounds import Rendered, rendered
 from ..stage.settings import prepare, samples_of
 from ..stage.stage import Stage, picture_region, stage
 from ..stage.takes import THINGS, WHOLE, only_things, take
-from ..work import Steps
+from ..work import Steps, Warned
 from . import planes
 from .behind import portals_seen, see_behind
+from .looked import key_of_look, looked_before, noted
 from .patterns import patterns_of
 from .planned import Given, Planned, planned
 
@@ -161,19 +162,29 @@ def begun(
     strips: int | None = None,
     takes: int = 1,
     often: bool = False,
+    place: Path | None = None,
 ) -> Steps[tuple[Planned, CaptureHead]]:
     """Look at the scene and plan the capture -> (`Planned`, the head of its capture set).
 
     The head has no rendered tile yet.
 
     folder: where the set will be; strips: the number of tiles of the picture (default: as many as
-    memory makes necessary); takes, often: see `planned`. Raises SceneError.
+    memory makes necessary); takes, often: see `planned`; place: a folder with earlier captures of
+    this shot, which may have looked at the very same scene. Raises SceneError.
     """
-    settings = this.scene.arto
+    settings, hemicube = this.scene.arto, this.hemicube
+    look, others = "", dict[str, object]()
+    if given is None:
+        look = key_of_look(this.head, this.hemicube, this.shot, this.found)
+        given = looked_before(place, look) if place else None
+        if given:
+            hemicube = given.hemicube
+        if given and given.caution:
+            yield Warned(0.0, f"CAUTION: {given.caution.text}")
     plan = yield from planned(
         this.scene,
         this.on,
-        this.hemicube,
+        hemicube,
         this.region,
         this.grain,
         folder,
@@ -182,6 +193,8 @@ def begun(
         takes,
         often,
     )
+    if look:
+        others = noted(look, this.on.pace or (given.pace if given else None))
     head = replace(
         this.head,
         hemicube=plan.hemicube,
@@ -204,5 +217,6 @@ def begun(
         fingerprint=this.found,
         caution=plan.caution,
         seconds=0.0,
+        others=others,
     )
     return plan, head

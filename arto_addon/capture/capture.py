@@ -16,8 +16,8 @@ from ...core.capture import head as heads
 from ...core.capture.head import CaptureHead
 from ...core.capture.kinds import Route, Take
 from ...core.capture.names import GRAIN, GROUP, group_name
-from ...core.capture.tile_entry import sums_of
-from ...core.errors import ArtoError, CaptureSetError, ExrError
+from ...core.capture.tile_entry import TileEntry, sums_of
+from ...core.errors import ArtoError, CaptureSetError, DeviceMemoryError, ExrError
 from ...core.files import Lock, whole
 from ...core.units import size
 from ..blender.output import write_to
@@ -30,7 +30,7 @@ from ..work import Progress, Render, Steps, Warned, Wrote
 from . import beside, planes, room
 from .asked import Asked, asked, begun
 from .check import check_patterns, check_room_of, check_scene
-from .plan import render_plan
+from .plan import ALIGNED, render_plan, strips_of
 from .planned import Given, Planned
 from .resume import empty, empty_take, finish, finish_field, let_go, unfinished
 from .room import Estimate
@@ -154,7 +154,7 @@ def _begun(
 ) -> Steps[tuple[Planned, CaptureHead]]:
     """Plan the first of a shot's takes, and count in what the takes beside it need."""
     count = 1 + len(takes.TAKES) * this.catchers
-    return begun(this, folder, given, takes=count, often=True)
+    return begun(this, folder, given, takes=count, often=True, place=folder.parent)
 
 
 def _capture_beside(
@@ -199,9 +199,8 @@ def _render_tiles(on: Stage, folder: Path, head: CaptureHead) -> Steps[CaptureHe
 
     Where the settings keep no images, the tiles are fitted as well.
     """
-    tiles = len(head.tiles)
     stream = None if head.kept else Stream(folder)
-    around = Around(on, head)
+    around = Around(on)
     heads.write(folder, head)
 
     def take(patience: float | None) -> bool:
@@ -214,20 +213,33 @@ def _render_tiles(on: Stage, folder: Path, head: CaptureHead) -> Steps[CaptureHe
 
     def fit(number: int) -> Iterator[Progress]:
         while take(0.1):
+            tiles = len(head.tiles)
             yield Progress((number + 0.5) / tiles, f"fitting tile {number} of {tiles}")
         if stream:
             stream.start(number)
 
     try:
-        for t in range(tiles):
-            entry = head.tiles[t]
+        t = -1
+        while (t := t + 1) < len(head.tiles):
+            entry, tiles = head.tiles[t], len(head.tiles)
             if entry.done:
                 yield Progress((t + 1) / tiles, f"tile {t + 1} of {tiles} is there")
                 if stream and entry.fitted is None:
                     yield from fit(t)
                 continue
             begun_at = time.perf_counter()
-            files = yield from render_tile(on, head, t, folder, around)
+            try:
+                files = yield from render_tile(on, head, t, folder, around)
+            except DeviceMemoryError as e:
+                smaller = _in_halves(folder, head, t)
+                if smaller is None:
+                    raise
+                yield Warned(t / tiles, f"{e}. It is tried again in smaller tiles")
+                head = smaller
+                heads.write(folder, head)
+                on.renew()
+                t -= 1
+                continue
             seconds = (head.seconds or 0.0) + time.perf_counter() - begun_at
             done = {"files": tuple(files), "sums": sums_of(folder, files), "done": True}
             head = replace(head.with_tile(t, **done), seconds=seconds)
@@ -235,12 +247,25 @@ def _render_tiles(on: Stage, folder: Path, head: CaptureHead) -> Steps[CaptureHe
             take(0.0)
             yield from fit(t)
         while take(0.1):
-            yield Progress(0.99, f"fitting tile {tiles} of {tiles}")
+            yield Progress(0.99, f"fitting tile {len(head.tiles)} of {len(head.tiles)}")
     finally:
         around.__exit__()
         if stream:
             stream.stop()
     return head
+
+
+def _in_halves(folder: Path, head: CaptureHead, number: int) -> CaptureHead | None:
+    """The head with the tile of this number, and all after it, cut into halves.
+
+    None where the tile is too thin. What was rendered of the tile is removed.
+    """
+    if head.tiles[number].region.height < 2 * ALIGNED:
+        return None
+    for there in folder.glob(f"tile_{number:04d}*.exr"):
+        marked.remove_file(there, "capture")
+    halves = [TileEntry(r) for e in head.tiles[number:] for r in strips_of(e.region, 2)]
+    return replace(head, tiles=(*head.tiles[:number], *halves))
 
 
 def plan_of(head: CaptureHead) -> list[list[tuple[int, str]]]:
@@ -256,8 +281,8 @@ class Around:
     needs others than the last.
     """
 
-    def __init__(self, on: Stage, head: CaptureHead) -> None:
-        self._on, self._head = on, head
+    def __init__(self, on: Stage) -> None:
+        self._on = on
         self._held = ExitStack()
         self._images: list[tuple[int, str]] | None = None
 
@@ -268,9 +293,9 @@ class Around:
         self._images = None
         self._held.close()
 
-    def set_tile(self, number: int, images: list[tuple[int, str]]) -> None:
+    def set_tile(self, head: CaptureHead, number: int, images: list[tuple[int, str]]) -> None:
         """Make the stage ready to render some images of a tile."""
-        on, head = self._on, self._head
+        on = self._on
         set_region(on.scene, head.tiles[number].region)
         if images == self._images:
             return
@@ -298,7 +323,7 @@ def render_tile(
         name = f"tile_{number:04d}.exr" if len(plan) == 1 else f"tile_{number:04d}_{i:04d}.exr"
         # a killed process may have finished the file without noting it down
         if not is_whole(folder / name, images):
-            around.set_tile(number, images)
+            around.set_tile(head, number, images)
             work = Render(on.scene.name, at / total, text, 1 / total)
             yield from _render(on, images, folder / name, work)
         files.append(name)

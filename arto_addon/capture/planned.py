@@ -23,6 +23,7 @@ from ...core.patterns import LobedSet, PatternSet
 from ...core.region import Region
 from ...core.units import size
 from ..stage.settings import samples_of
+from ..stage.small import threads
 from ..stage.stage import Pace, Stage, picture_region
 from ..stage.takes import TAKES
 from ..work import Progress, Steps
@@ -110,11 +111,14 @@ def planned(
         seconds, pace = None, on.pace or (given.pace if given else None)
         if pace:
             tracing = region.pixels * samples_of(scene) * len(plan) * pace.path
+            # with other planes for each render of a tile, each is prepared for
+            once = on.is_kept and len(plan) == 1
+            ready = pace.again if once else len(plan) * pace.ready
             if often and not strips:
-                ready = len(plan) * pace.ready
                 tiles = kept_often(tiles, region, tracing + len(tiles) * ready, ready)
-            seconds = tracing + len(plan) * len(tiles) * pace.ready
-            seconds += sum(plan) * len(tiles) * pace.layer
+            seconds = tracing + len(tiles) * ready + (pace.ready if once else 0.0)
+            each = room.SAVING + (0.0 if kept else room.FITTING / threads(on.scene))
+            seconds += region.pixels * sum(plan) * each * pace.busy
         one = room.estimate(plan, tiles, len(hemicube), not kept, seconds)
         return tiles, one.times(takes)
 

@@ -28,6 +28,9 @@ OTHER_PASSES = 9
 # About the bytes of a field on disk, with layers and proxies: for a pixel, and for each of its
 # patches.
 FIELD, FIELD_PATCH = 74, 2.0
+# Measured seconds of one thread for a pixel of a basis image: to save it and look at it, and to fit
+# it (`python -m bench heavy`).
+SAVING, FITTING = 5e-8, 9e-8
 # How much more disk must be free than is needed, as a share of the need.
 SPARE = 0.05
 

@@ -216,6 +216,7 @@ class PartHead:
     seconds : how long the part took.
     fitted : the entry in `field.json`, if the part was fitted and its images removed.
     sums : the checksums of the files, by their names.
+    device : what it was rendered with; empty where that is not said.
     """
 
     part: Part
@@ -225,6 +226,7 @@ class PartHead:
     seconds: float = 0.0
     fitted: Mapping[str, object] | None = None
     sums: Mapping[str, int] = field(default_factory=dict)
+    device: str = ""
 
     @staticmethod
     def read(said: Values) -> PartHead:
@@ -243,6 +245,7 @@ class PartHead:
             seconds=said.real("seconds", 0, LONGEST) or 0.0,
             fitted=fitted,
             sums=checked_sums(said),
+            device=said.some_text("device") or "",
         )
 
     def to_json(self) -> dict[str, object]:
@@ -256,6 +259,8 @@ class PartHead:
             said["fitted"] = dict(self.fitted)
         if self.sums:
             said["sums"] = dict(self.sums)
+        if self.device:
+            said["device"] = self.device
         return said | {"files": list(self.files), "seconds": self.seconds}
 
 

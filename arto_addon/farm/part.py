@@ -20,6 +20,7 @@ from ...core.capture.tile_entry import sums_of
 from ...core.errors import FarmError
 from ...core.files import replace_folder, whole
 from ...core.fit.fit import fit_into
+from ..blender import devices
 from ..blender.output import write_to
 from ..capture import room
 from ..capture.asked import Asked, asked
@@ -32,10 +33,11 @@ from .head import Part, PartHead, write_part
 from .job import Job, estimate
 
 
-def render_part(job_folder: Path, number: int) -> Steps[Path]:
+def render_part(job_folder: Path, number: int, device: str = "") -> Steps[Path]:
     """Render a part of a job, unless it is there already; returns the part's folder.
 
     A part is there as a whole or not at all; a part whose process was killed is rendered again.
+    device: see `devices.render_with`; the part says which it was rendered with.
     Raises FarmError where the scene has changed since the plan, and what `capture` raises.
     """
     job = Job(job_folder)
@@ -59,8 +61,10 @@ def render_part(job_folder: Path, number: int) -> Steps[Path]:
         partial = marked.scratch(folder, "part")
         with (
             _on_stage(job, part, captured) as this,
-            Around(this.on, captured.head) as around,
+            Around(this.on) as around,
         ):
+            devices.render_with(this.on.scene, device)
+            rendered_with = devices.used(this.on.scene)
             files = yield from render_tile(this.on, captured.head, part.tile, partial, around)
         entry = None
         if fitted:
@@ -76,6 +80,7 @@ def render_part(job_folder: Path, number: int) -> Steps[Path]:
             seconds=round(time.perf_counter() - begun, 3),
             fitted=entry,
             sums=sums_of(partial, files),
+            device=rendered_with,
         )
         write_part(partial, told)
         try:
@@ -89,7 +94,7 @@ def render_part(job_folder: Path, number: int) -> Steps[Path]:
     finally:
         if partial:
             marked.remove_quietly(partial, "part", folder.parent)
-    yield Wrote(1.0, f"rendered {part.name}", folder)
+    yield Wrote(1.0, f"rendered {part.name} ({rendered_with})", folder)
     return folder
 
 
@@ -122,8 +127,8 @@ def save_part(job_folder: Path, number: int) -> Steps[Path]:
             yield Progress(i / len(plan_of(captured.head)), f"saving {part.name}")
             path = job.folder / "parts" / f"{part.name}_{i:02d}.blend"
             path.parent.mkdir(parents=True, exist_ok=True)
-            with Around(this.on, captured.head) as around:
-                around.set_tile(part.tile, images)
+            with Around(this.on) as around:
+                around.set_tile(captured.head, part.tile, images)
                 write_to(this.on.scene.render, Path(f"//{part.name}_{i:02d}_####.exr"))
                 # by which a gathering knows of what the picture is, whatever its name
                 this.on.scene.render.use_stamp_note = True

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -61,41 +62,60 @@ def parts_of(
         with _timed() as laps:
             yield request
         request.check()
+        on.pace = laps.pace(on)
         with exr.Layers(path) as there:
-            on.pace = laps.pace(on, len(there.names))
             return {n: np.array(there.read(n)) for n in there.names if n.endswith(only)}
 
 
 class _Laps:
-    """When a render began, when its first and last paths were traced, and when it ended."""
+    """When a render began, and when its first and last paths were traced: seconds, and seconds of
+    all threads."""
 
     def __init__(self) -> None:
-        self.begun = self.traced = self.written = self.ended = time.perf_counter()
+        self.begun = self.traced = self.written = _now()
 
-    def pace(self, on: Stage, layers: int) -> Pace:
+    def pace(self, on: Stage) -> Pace:
+        """How fast the stage renders, by this render and those before it."""
         paths = picture_region(on.scene).pixels * on.scene.cycles.samples
+        tracing, worked = (b - a for a, b in zip(self.traced, self.written, strict=True))
+        ready, before = self.traced[0] - self.begun[0], on.pace
+        busy = 1.0
+        if on.scene.cycles.device == "CPU" and worked > 0:
+            busy = tracing * threads(on.scene) / worked
         return Pace(
-            self.traced - self.begun,
-            (self.written - self.traced) / paths,
-            (self.ended - self.written) / layers,
+            max(ready, before.ready if before else 0.0),
+            min(ready, before.again if before else ready),
+            tracing / paths,
+            max(busy, 1.0),
         )
+
+
+def _now() -> tuple[float, float]:
+    return time.perf_counter(), time.process_time()
+
+
+def threads(scene: bpy.types.Scene) -> int:
+    """How many threads Cycles renders a scene with on the processor."""
+    if scene.render.threads_mode == "FIXED":
+        return int(scene.render.threads)
+    return os.cpu_count() or 1
 
 
 @contextmanager
 def _timed() -> Iterator[_Laps]:
     """Time a render's stages, which Cycles' status lines tell apart."""
     laps = _Laps()
-    traced: list[float] = []
+    traced: list[tuple[float, float]] = []
 
     def told(*arguments: object) -> None:
         says = str(arguments[0]) if arguments else ""
         if "Sample" in says or "Finished" in says:
-            traced.append(time.perf_counter())
+            traced.append(_now())
 
     bpy.app.handlers.render_stats.append(told)
     try:
         yield laps
     finally:
         bpy.app.handlers.render_stats.remove(told)
-    laps.ended = time.perf_counter()
-    laps.traced, laps.written = (traced[0], traced[-1]) if traced else (laps.begun, laps.ended)
+    ended = _now()
+    laps.traced, laps.written = (traced[0], traced[-1]) if traced else (laps.begun, ended)

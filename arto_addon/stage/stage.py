@@ -28,13 +28,15 @@ _KEEP_PASSES = {"use_pass_combined", "use_pass_z"}
 class Pace:
     """How fast a stage renders.
 
-    ready: seconds until the first path; path: seconds for a path; layer: seconds for writing a
-    layer.
+    ready: seconds until the first path, where Cycles has to prepare the scene; again: the same
+    where Cycles kept the scene; path: seconds for a path; busy: how many times longer that takes
+    than on a machine that does nothing else.
     """
 
     ready: float
+    again: float
     path: float
-    layer: float
+    busy: float = 1.0
 
 
 _Block = TypeVar("_Block", bound=bpy.types.ID)
@@ -46,7 +48,7 @@ class Stage:
     def __init__(self, scene: bpy.types.Scene) -> None:
         self.scene = scene
         self.changed: dict[str, list[object]] = {}
-        self.pace: Pace | None = None  # How fast the last small render was.
+        self.pace: Pace | None = None  # How fast the small renders were.
         # Whether Ray Portals show the patches to the camera; see `capture.behind`.
         self.portals: bool | None = None
         self.own_groups: list[str] = []  # The artist's light groups that have objects.
@@ -91,10 +93,15 @@ class Stage:
         """
         samples = self.scene.cycles.samples
         if self.is_kept and samples < self._longest:
-            self.let_go()
-            self.keep_prepared()
-            self._longest = 0
+            self.renew()
         self._longest = max(self._longest, samples)
+
+    def renew(self) -> None:
+        """Have Cycles prepare the scene again, and keep it from then on if it did before."""
+        kept, self._longest = self.is_kept, 0
+        self.let_go()
+        if kept:
+            self.keep_prepared()
 
     def let_go(self) -> None:
         """Free the scene that Cycles has prepared. The next render prepares it again."""

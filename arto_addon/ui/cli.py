@@ -281,7 +281,11 @@ def _of_a_farm(verb: str, options: dict[str, Any], report: Report, batch: Batch)
     if verb == "gather":
         work = gather(folder, batch)
     else:
-        work = (save_part if options["save_blend"] else render_part)(folder, options["number"])
+        number = options["number"]
+        saves = options["save_blend"]
+        work = (
+            save_part(folder, number) if saves else render_part(folder, number, options["device"])
+        )
     made = run(_as_asked(work, batch, verb == "gather"), report)
     for path in made if isinstance(made, list) else [made]:
         # render managers look for this line

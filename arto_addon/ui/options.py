@@ -8,6 +8,7 @@ import re
 from pathlib import Path
 
 from ...core.file_names import is_text
+from ..blender.devices import KINDS
 from ..settings import table
 from ..settings.setting import Setting
 
@@ -95,6 +96,12 @@ def parser() -> argparse.ArgumentParser:
                 "--save-blend",
                 action="store_true",
                 help="save it for a Blender without ARTO to render, and render nothing",
+            )
+            one.add_argument(
+                "--device",
+                choices=("CPU", "GPU", *KINDS),
+                default="",
+                help="what to render with (default: as the file and the preferences have it)",
             )
         one.add_argument("--job", type=_path, required=True, help="the folder of the job")
         one.add_argument(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from arto.arto_addon import work
+from arto.arto_addon.capture.capture import capture
 from arto.arto_addon.stage.stage import Stage
 from arto.core import exr
 from arto.core.capture.capture_set import CaptureSet
@@ -14,16 +16,36 @@ from bench.heavy import counted
 def layers(taken: CaptureSet) -> list[np.ndarray]:
     """All layers of all tiles."""
     names = [taken.folder / name for tile in taken.head.tiles for name in tile.files]
-    return [pixels for name in names for pixels in exr.read(name).values()]
+    return [np.array(pixels) for name in names for pixels in exr.read(name).values()]
+
+
+def first_render(scene) -> str:
+    """What a capture renders first, which is not rendered."""
+    steps = capture(scene, scene.view_layers[0].name)
+    text = next(step.text for step in steps if isinstance(step, work.Render))
+    steps.close()
+    return text
 
 
 def test_a_capture_in_tiles_is_prepared_twice_and_is_the_same_to_the_bit(tmp_path, monkeypatch):
     scene = small_scene(tmp_path)
     scene.arto.memory, scene.arto.samples, scene.arto.adaptive = 1, 48, True
     with counted() as kept:
-        kept_layers = layers(captured(scene))
+        there = captured(scene)
+    kept_layers, patches = layers(there), there.head.hemicube
     assert kept.renders >= 3 + 2  # a look at the patches, two at a white world, and the tiles
     assert kept.prepared_times == 2
+
+    # With other samples the scene is the same, and is not looked at again.
+    scene.arto.samples = 50
+    with counted() as again:
+        assert captured(scene).head.hemicube == patches
+    assert again.renders == kept.renders - 3 and again.prepared_times == 1
+    scene.arto.samples = 48
+    scene.objects["Matt"].location.x += 0.1
+    assert first_render(scene).startswith("looking at")
+    scene.objects["Matt"].location.x -= 0.1
+
     monkeypatch.setattr(Stage, "keep_prepared", lambda _: None)
     scene.arto.folder = str(tmp_path / "anew")
     with counted() as anew:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from types import SimpleNamespace
 
@@ -166,15 +167,18 @@ def test_the_estimate_is_of_what_comes(tmp_path, monkeypatch):
         most = 1.05 if bpy.app.version >= (5, 0) else 1.08
         assert size <= found.kept < (most if keep == "always" else 1.15) * size
         assert found.seconds is not None and found.seconds > 0
-    # and time is of renders, paths and layers, at the pace of the last small render
-    monkeypatch.setattr(small._Laps, "pace", lambda *_: Pace(2.0, 1e-5, 0.25))
-    for samples in (4, 4000):
-        scene.arto.samples = samples
+    # and time is of getting ready, of paths and of images, at the pace of the small renders
+    monkeypatch.setattr(small._Laps, "pace", lambda *_: Pace(2.0, 0.5, 1e-5, 3.0))
+    for seed, samples in enumerate((4, 4000), 1):
+        scene.arto.samples, scene.arto.seed = samples, seed  # a scene that was not looked at
         found = work.run(capture.estimate(scene, scene.view_layers[0].name))
         # work is kept every minute, so many samples are more renders; each is of 6 patches under 5
         # patterns and the grain
         assert found.renders == 3 if samples == 4 else found.renders > 3
-        expected = found.renders * (2.0 + 36 * 0.25) + 144 * 108 * samples * 1e-5
+        tracing, images = 144 * 108 * samples * 1e-5, 144 * 108 * 36
+        each = 3.0 * (room.SAVING + room.FITTING / (os.cpu_count() or 1))
+        # the scene is prepared once for all renders
+        expected = 2.0 + found.renders * 0.5 + tracing + images * each
         assert found.seconds == pytest.approx(expected)
 
 
