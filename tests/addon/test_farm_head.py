@@ -90,6 +90,7 @@ OF_PART: dict[str, list[Any]] = {
     "seconds": [-1.0, 1e300, "long", 10**400, True],
     "fitted": [3, [], {}, {"file": "tile_0002.arto"}, {"file": "../x"}, {"file": {}}],
     "sums": [3, [], {"a.exr": -1}, {"a.exr": 2**32}, {"a.exr": "1"}, {"a.exr": True}],
+    "device": [3, LONG, []],
 }
 OF_WHICH: dict[str, list[Any]] = {
     "number": [None, -1, 1.0, "7", True, 10**7],
