@@ -25,7 +25,7 @@ from ..light.environment import Environment
 from .answers import Answers
 from .match import ODD, ROUNDS, Matched, brought, concluded, pull_of
 from .solve import nonnegative
-from .target import Target
+from .target import Target, between
 
 # The turns that are tried, and the width in texels of the map that is turned.
 TURNS, TURNED_WIDTH = 72, 256
@@ -95,7 +95,7 @@ def solved(
     else:
         kept = fixed[used]
     wanted, dark = asked.picture[used] - kept, asked.dark
-    relative = asked.relative(every)[used]
+    relative = np.maximum(np.maximum(asked.picture, every)[used], 0) + dark
     weights = asked.weights[used] / asked.weights[used].sum()
     hold = np.tile(1 / scale if free_scale else np.ones(3), (len(pictures), 1))
     count = len(lights)
@@ -125,7 +125,7 @@ def solved(
         for (i, c), value in zip(columns, x, strict=True):
             found[i, slice(None) if c is None else c] = value
         made = np.tensordot(x, basis, 1)
-        relative = np.maximum(np.maximum(asked.picture[used], made + kept), 0) + dark
+        relative = between(asked.picture[used], made + kept) + dark
         off = (made - wanted) / relative
         error = float((weights[:, None] * np.abs(off)).sum() / 3)
         some = 1 / np.sqrt(off**2 + ODD**2)

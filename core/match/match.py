@@ -25,7 +25,7 @@ from .answers import Answers
 from .cells import Cells
 from .missing import Missing, missing
 from .solve import nonnegative
-from .target import Target
+from .target import Target, between
 
 # Rounds in which what does not fit loses weight, and by which relative error a pixel has lost half.
 ROUNDS, ODD = 3, 0.05
@@ -226,7 +226,10 @@ def _solved(
         some, link = np.ones(len(used)), np.ones(len(pairs))
         x: NDArray[np.float64] | None = None
         for i in range(ROUNDS):
-            relative = np.maximum(np.maximum(asked[:, c], made), 0) + dark
+            # the brighter of both at first, so that a place that cannot be as dark as it should be
+            # does not rule where the search begins
+            ruled = between if i else np.maximum
+            relative = np.maximum(ruled(asked[:, c], made), 0) + dark
             root = (np.sqrt(some * weights) / relative).astype(np.float32)
             weighted = matrix * root
             gram = (weighted @ weighted.T).astype(np.float64)
@@ -239,7 +242,7 @@ def _solved(
             np.add.at(gram, (two, one), -e)
             x = nonnegative(gram, right + pull * hold, x)
             made = x.astype(np.float32) @ matrix + lamps[:, c]
-            off = (made - asked[:, c]) / (np.maximum(np.maximum(asked[:, c], made), 0) + dark)
+            off = (made - asked[:, c]) / (between(asked[:, c], made) + dark)
             some = 1 / np.sqrt(off**2 + ODD**2)
             some /= weights @ some
             link = 1 / np.sqrt(((x[one] - x[two]) / mean[c]) ** 2 + STEP**2)

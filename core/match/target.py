@@ -52,24 +52,6 @@ class Target:
                 "it again"
             )
 
-    def relative(self, shown: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Compute what an error of each pixel and colour is divided by.
-
-        A highlight so counts no more than a shadow, each relative to its own light. The brighter of
-        target and picture counts: a place that is to be dark and is not counts no more than one
-        that is to be bright.
-
-        Parameters
-        ----------
-        shown : (n, 3) float64
-            The picture so far.
-
-        Returns
-        -------
-        (n, 3) float64
-        """
-        return np.maximum(np.maximum(self.picture, shown), 0) + self.dark
-
     @property
     def dark(self) -> float:
         """The light that is added where errors are taken relative to a pixel's light."""
@@ -88,6 +70,21 @@ class Target:
         Target
         """
         return Target(self.picture * gain, self.weights)
+
+
+def between(target: NDArray[np.float64], shown: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give the target's light, or the geometric mean with a picture that is brighter.
+
+    Parameters
+    ----------
+    target, shown : (...) float64
+
+    Returns
+    -------
+    (...) float64
+    """
+    asked = np.maximum(target, 0)
+    return np.sqrt(asked * np.maximum(asked, shown))
 
 
 def smaller(picture: NDArray, shape: tuple[int, int], factor: int) -> NDArray[np.float64]:
