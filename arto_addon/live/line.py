@@ -36,3 +36,13 @@ def line(scene: bpy.types.Scene, shown: Drawn, lacks: list[str], took: float | N
     if not scene.arto.live_finish:
         return tr("{said}: Relight adds this", said=said)
     return tr("{said}: added {time} later", said=said, time=clock(took or GUESS))
+
+
+def other_shot(was: tuple, now: tuple) -> str:
+    """Say that the scene shows another shot than Live, whose light Live follows all the same.
+
+    was, now: what tells a shot from others, the frame first and its part after it.
+    """
+    if was[2:] == now[2:]:
+        return tr("The light of frame {now}, on the shot of frame {was}", now=now[0], was=was[0])
+    return tr("Live shows the shot that it was switched on for: this is another one")

@@ -39,7 +39,7 @@ from ..world.kept import shows
 from ..world.own import gains_of
 from . import maps
 from .image import Seen, push, put_away, seen, show_plate
-from .line import FINISHED_LINE, lacking, line
+from .line import FINISHED_LINE, lacking, line, other_shot
 from .quick import Quick
 from .viewer import Viewer, Wish
 from .wished import Light, Wished
@@ -138,7 +138,7 @@ class Live:
         said = self.maps.trouble_with(self._now.key) if self._now else ""
         trouble = self.film or self.problem or said or self.viewer.trouble or self.failed
         if self._place(scene) != self._shot:
-            trouble = "Live shows the shot that it was switched on for: this is another one"
+            trouble = other_shot(self._shot, self._place(scene))
         if trouble != self.trouble:
             self.trouble = trouble
             watch.redraw()
