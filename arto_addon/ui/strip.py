@@ -32,13 +32,12 @@ def draw(
         shelf.look(lambda: None)
         if shelf.looking() and not bpy.app.timers.is_registered(_found):
             bpy.app.timers.register(_found, first_interval=WAIT)
-    items = shelf.items()
-    if not items:
+    items, now = shelf.items(), _shown_by(world) if world else None
+    if all(item == now for item in items):  # nothing to choose
         return
     switch = context.window_manager.arto
     first = min(switch.strip, (len(items) - 1) // ACROSS) * ACROSS
     shown = [*items[first : first + ACROSS]]
-    now = _shown_by(world) if world else None
     row = column.row(align=True)
     if len(items) > ACROSS:
         _turn(row, "TRIA_LEFT", -1, first > 0)
