@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...core import exr
 from ...core.errors import ArtoError, TargetError
 from ...core.match.target import fitting
+from ..blender import sequences
 from ..blender.colour import working_space
 from ..shot import home
 
@@ -56,6 +57,15 @@ def asked(scene: bpy.types.Scene, shape: tuple[int, int]) -> Asked:
     return Asked(np.where(good[..., None], fit[..., :3], 0), mask * good, keep, words)
 
 
+def named_in(scene: bpy.types.Scene) -> list[Path]:
+    """The files of the target and the masks that the settings name."""
+    settings = scene.arto
+    found = [home.absolute(settings.match_target)] if settings.match_target else []
+    for image in (settings.match_image, settings.match_mask, settings.match_keep):
+        found += sequences.files_of(image) if image else []
+    return found
+
+
 def masks(
     scene: bpy.types.Scene, shape: tuple[int, int]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -81,6 +91,8 @@ def _of_file(path: Path) -> NDArray[np.float64]:
     """The pixels of a target's file, (h, w, 3 or 4). Raises TargetError, ExrError."""
     if not path.is_file():
         raise TargetError(f"there is no file {path}: choose a target")
+    if wrong := sequences.damage(path):
+        raise TargetError(f"{wrong}: copy it anew, or choose another target")
     if path.suffix.lower() == ".exr":
         for pixels in exr.read(path).values():
             if pixels.shape[-1] >= 3:
@@ -98,6 +110,9 @@ def _of_file(path: Path) -> NDArray[np.float64]:
 
 def _raw(image: bpy.types.Image) -> NDArray[np.float64]:
     """An image's numbers as Blender has them, (h, w, 4), rows top-down. Raises TargetError."""
+    for path in sequences.files_of(image):
+        if path.is_file() and (wrong := sequences.damage(path)):
+            raise TargetError(f"{wrong}: copy it anew, or choose another image")
     width, height = image.size
     if not width or not height or image.channels != 4:
         raise TargetError(f"the image '{image.name}' has no pixels: reload it, or choose another")

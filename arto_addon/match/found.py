@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from ...core import exr
 from ...core.errors import TargetError
 from ..blender.colour import working_space
-from ..plate import marks
 from ..plate.marks import PLATE
+from ..relight.outputs import check_beside
+from .asked import named_in
 
 HEADER = "arto.match"
 
@@ -58,7 +59,7 @@ def write(
     difference: (h, w, 3).
     """
     path = match_file(plate)
-    marks.check(path, plate, scene.arto.overwrite)
+    check_beside(scene, path, plate, named_in(scene))
     about = {PLATE: plate.name, HEADER: json.dumps(asdict(found))}
     exr.write(path, {"": difference.astype(np.float32)}, about, working_space())
     return path

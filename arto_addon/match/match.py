@@ -21,17 +21,17 @@ from ...core.match.match import Matched, free_light
 from ...core.match.target import Target
 from ...core.preview import Preview
 from ..blender.colour import working_space
-from ..plate import marks
 from ..plate.marks import PLATE
 from ..plate.names import relit_file
 from ..plate.plate import world_file
 from ..relight import looks
+from ..relight.outputs import check_beside
 from ..relight.shown import Shown
 from ..shot.shot import check_same_shot
 from ..work import Progress, Steps, Warned, Wrote
 from ..world import kept
 from ..world.check import check_world
-from .asked import asked, masks
+from .asked import asked, masks, named_in
 from .found import Found, write
 from .lights import BASE, WORLD, lights_of, own_parts
 
@@ -135,7 +135,7 @@ def _matched(
         )
         assert done.environment is not None
         lit = world_file(relit_file(scene, look))
-        marks.check(lit, relit_file(scene, look), settings.overwrite)
+        check_beside(scene, lit, relit_file(scene, look), named_in(scene))
         about = {PLATE: relit_file(scene, look).name}
         exr.write(lit, {"": done.environment.image}, about, working_space())
         yield Wrote(0.95, f"wrote {lit}", lit)

@@ -11,7 +11,8 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 from ...core import exr
-from ...core.errors import KitError
+from ...core.errors import ExrError, KitError, SceneError
+from ...core.file_names import is_text
 from ...core.kit.found import lights_of
 from ...core.kit.light import Blend, Kind, Light
 from ...core.kit.model import Base, BaseKind, Kit, free_name
@@ -22,15 +23,19 @@ from ..kit import kit as kits
 from ..kit.lamps import shade
 from ..plate.names import relit_file
 from ..plate.plate import world_file
+from ..shot.home import check_outside
 from ..shot.shot import layer_of
 from ..stage.bounds import scene_bounds
 from ..stage.stage import stage
 from ..world.bake import bake
 from ..world.check import check_world
 from ..world.detail import FINEST, detail
+from .inputs import inputs
 
 # The widths of maps that are written.
 NARROWEST, WIDEST = 1024, 8192
+# What says in a header that ARTO wrote the file, and of which world.
+EXPORTED = "arto.light of"
 # Lamps stand so many radii of the scene away, where each point of the scene sees them alike.
 FAR = 1000.0
 
@@ -42,15 +47,37 @@ def width_of(world: bpy.types.World) -> int:
     return int(np.clip(2 ** math.ceil(math.log2(max(wanted, 2))), NARROWEST, WIDEST))
 
 
-def to_hdri(scene: bpy.types.Scene, path: Path) -> tuple[int, int]:
+def to_hdri(scene: bpy.types.Scene, path: Path, overwrite: bool = False) -> tuple[int, int]:
     """Write the light of the scene's world as an HDRI -> (width, height).
 
-    Any world will do, with a kit or without. Raises SceneError, CancelledError.
+    Any world will do, with a kit or without. overwrite: whether a file is written over that is no
+    such HDRI. Raises SceneError, CancelledError.
     """
     world = check_world(scene, layer_of(scene))
+    _check(scene, path, overwrite or scene.arto.overwrite)
     image = bake(scene, width_of(world), None, world).image
-    exr.write(path, {"": image}, None, working_space())
+    exr.write(path, {"": image}, {EXPORTED: world.name}, working_space())
     return image.shape[1], image.shape[0]
+
+
+def _check(scene: bpy.types.Scene, path: Path, overwrite: bool) -> None:
+    """Raise SceneError where an HDRI would be written over another file, or where it is removed."""
+    check_outside(path, "an HDRI")
+    if not is_text(path):
+        raise SceneError(f"the name {str(path)!a} is not written in UTF-8: choose another")
+    if found := inputs(scene).over(path):
+        raise SceneError(f"{path} is {found.what}, and is not written over: choose another file")
+    if overwrite or not path.exists():
+        return
+    try:
+        own = path.is_file() and EXPORTED in exr.header(path)
+    except ExrError:
+        own = False
+    if not own:
+        raise SceneError(
+            f"{path} is there, and is no HDRI that ARTO wrote of a light: choose another file, or "
+            "move it away"
+        )
 
 
 def suns_to_lights(scene: bpy.types.Scene) -> list[str]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+
+import bpy
 
 from ...core.errors import SceneError
 from ...core.files import is_writable
@@ -57,6 +59,20 @@ def check_picture(shown: Shown, path: Path, read: Inputs | None = None) -> None:
     for output in written:
         marks.check(output, path, scene.arto.overwrite)
     check_room({path: bytes_of(shown)})
+
+
+def check_beside(
+    scene: bpy.types.Scene, path: Path, plate_path: Path, read: Iterable[Path] = ()
+) -> None:
+    """Look at a single file that is to be written beside a plate, or by itself.
+
+    read: what it is made of, besides what the scene is made of. Raises SceneError where the file
+    would be written over one of these or over a file of others.
+    """
+    check_outside(path, "pictures")
+    if found := inputs(scene, read).over(path):
+        raise SceneError(f"{path} is {found.what}, and is not written over: choose another file")
+    marks.check(path, plate_path, scene.arto.overwrite)
 
 
 def possible(path: Path) -> list[Path]:

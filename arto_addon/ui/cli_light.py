@@ -15,7 +15,7 @@ from ..kit import kit as kits
 from ..relight import kit_out
 from ..shot import home
 from ..world.check import world_of
-from .report import OptionError
+from .report import OptionError, check_place
 
 
 def light(scene: bpy.types.Scene, layer: str, options: dict[str, Any]) -> None:
@@ -40,6 +40,7 @@ def light(scene: bpy.types.Scene, layer: str, options: dict[str, Any]) -> None:
         if said:
             print(json.dumps(kit_file.to_json(kit)), flush=True)
         else:
+            check_place(file.resolve())
             try:
                 kit_file.save(kit, file.resolve())
             except OSError as e:
@@ -47,7 +48,7 @@ def light(scene: bpy.types.Scene, layer: str, options: dict[str, Any]) -> None:
             print(f"ARTO light: wrote {file.resolve()}", flush=True)
     if options["hdri"] is not None:
         path = options["hdri"].resolve()
-        width, height = kit_out.to_hdri(scene, path)
+        width, height = kit_out.to_hdri(scene, path, options["write"])
         print(f"ARTO light: wrote {path}, {width} x {height}", flush=True)
 
 

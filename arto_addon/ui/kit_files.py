@@ -13,6 +13,7 @@ from ...core.errors import SceneError
 from ...core.kit import kit_file
 from ..kit import kit as kits
 from ..relight import kit_out
+from ..shot.home import check_outside
 from ..world.check import world_of
 from .kit_operators import OfLight, choose, world_to_change
 from .operators import Quick
@@ -58,6 +59,9 @@ class ARTO_OT_kit_save(_File, OfLight):
         if world is None:
             raise SceneError("the scene has no world")
         path = Path(bpy.path.ensure_ext(bpy.path.abspath(self.filepath), ".json"))
+        check_outside(path, "a kit")
+        if path.exists():
+            kit_file.load(path)  # no file of another kind is written over
         kit_file.save(kit_out.portable(kits.read(world)), path)
         return f"wrote {path}"
 

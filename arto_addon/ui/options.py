@@ -147,9 +147,9 @@ def _add_light(one: argparse.ArgumentParser) -> None:
 
 
 def _add_match(one: argparse.ArgumentParser) -> None:
-    one.add_argument("target", type=Path, help="the picture that the shot is to look like")
-    one.add_argument("--mask", type=Path, help="a picture that is white where the target counts")
-    one.add_argument("--keep", type=Path, help="a picture that is white where the shot stays")
+    one.add_argument("target", type=_path, help="the picture that the shot is to look like")
+    one.add_argument("--mask", type=_path, help="a picture that is white where the target counts")
+    one.add_argument("--keep", type=_path, help="a picture that is white where the shot stays")
     one.add_argument("--save", action="store_true", help="save the .blend with the light as a look")
 
 

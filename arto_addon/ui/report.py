@@ -41,12 +41,8 @@ _TAKEN = re.compile(r"(?i)lock|(shot|arto-folder)\.json|.*\.(exr|arto|npy|blend|
 _OF_JOB = {"job.json", "openjd.json", "templates.json", "commands.txt"}
 
 
-def check_file(path: Path, form: str, job: Path | None = None) -> None:
-    """Look at the place of a file of JSON. form: its `format`; job: the folder of a farm's job.
-
-    Raises OptionError where a file is there that ARTO has not written, and where ARTO writes other
-    files of that name or removes the folder.
-    """
+def check_place(path: Path, job: Path | None = None) -> None:
+    """Raise OptionError where no file of JSON can be. job: the folder of a farm's job."""
     if not is_text(path):
         raise OptionError(f"--json {str(path)!a}: the name is not written in UTF-8")
     of_job = job is not None and path.parent == job.resolve() and path.name.lower() in _OF_JOB
@@ -56,6 +52,15 @@ def check_file(path: Path, form: str, job: Path | None = None) -> None:
         check_outside(path, "a report")
     except SceneError as e:
         raise OptionError(f"--json {e}") from e
+
+
+def check_file(path: Path, form: str, job: Path | None = None) -> None:
+    """Look at the place of a file of JSON. form: its `format`; job: the folder of a farm's job.
+
+    Raises OptionError where a file is there that ARTO has not written, and where ARTO writes other
+    files of that name or removes the folder.
+    """
+    check_place(path, job)
     if not os.path.lexists(path) or (path.is_file() and path.stat().st_size == 0):
         return
     if json_object(path, _MOST).get("format") != form:

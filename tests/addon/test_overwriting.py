@@ -10,14 +10,16 @@ import bpy
 import numpy as np
 import pytest
 from arto.arto_addon import work
+from arto.arto_addon.match.asked import asked, named_in
 from arto.arto_addon.plate import composite, marks
 from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.plate.together import Together
-from arto.arto_addon.relight import many, relight
+from arto.arto_addon.relight import kit_out, many, relight
 from arto.arto_addon.relight.inputs import Input, Inputs, inputs
+from arto.arto_addon.relight.outputs import check_beside
 from arto.arto_addon.ui.inventory import inventory
 from arto.core import exr
-from arto.core.errors import BusyError, SceneError
+from arto.core.errors import BusyError, SceneError, TargetError
 from arto.core.file_names import same_file
 from arto.core.places import in_turn
 
@@ -198,3 +200,31 @@ def test_a_composite_of_somebody_else_stays_and_an_older_one_is_told(shot, there
         assert (states["plate"], states["composite"]) == ("whole", "outdated")
     finally:
         shot.arto.own_lamps = 1.0
+
+
+def test_a_light_is_written_over_no_other_file(shot, there):
+    """As an HDRI, as a kit, and as what a match has found."""
+    before = picture(there / "sky.exr")
+    with pytest.raises(SceneError, match="no HDRI that ARTO wrote"):
+        kit_out.to_hdri(shot, there / "sky.exr")
+    node = next(n for n in shot.world.node_tree.nodes if n.bl_idname == "ShaderNodeTexEnvironment")
+    theirs, node.image = node.image, bpy.data.images.load(str(there / "sky.exr"))
+    try:
+        with pytest.raises(SceneError, match="the world's image"):
+            kit_out.to_hdri(shot, there / "sky.exr", overwrite=True)
+    finally:
+        node.image = theirs
+    shot.arto.match_target, shot.arto.overwrite = str(there / "sky.exr"), True
+    try:
+        with pytest.raises(SceneError, match="is not written over"):
+            check_beside(shot, there / "sky.exr", relit_file(shot), named_in(shot))
+    finally:
+        shot.arto.match_target = ""
+    assert (there / "sky.exr").read_bytes() == before
+    (there / "cut.jpg").write_bytes(b"\xff\xd8\xff half")
+    shot.arto.match_target = str(there / "cut.jpg")
+    try:
+        with pytest.raises(TargetError, match="cut off"):
+            asked(shot, (8, 16))
+    finally:
+        shot.arto.match_target = ""
