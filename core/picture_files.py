@@ -55,12 +55,13 @@ def kind_of(path: Path) -> str:
     return "TIFF" if begins in _TIFFS else "JPEG" if begins.startswith(_JPEG) else ""
 
 
-def is_cut_file(path: Path) -> bool:
+def is_cut_file(path: Path, unpacks: bool = True) -> bool:
     """Say whether a part of a file is missing, see `is_cut`.
 
     Parameters
     ----------
     path : Path
+    unpacks : bool
 
     Returns
     -------
@@ -72,19 +73,20 @@ def is_cut_file(path: Path) -> bool:
             if not file.seek(0, 2):
                 return True
             with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-                return is_cut(data)
+                return is_cut(data, unpacks)
     except OSError:
         return True
 
 
-def is_cut(data: bytes | mmap.mmap) -> bool:
+def is_cut(data: bytes | mmap.mmap, unpacks: bool = True) -> bool:
     """Say whether a part of a JPEG or a TIFF is missing; False for other kinds.
-
-    Of a TIFF packed with Deflate the pixels are unpacked, so that flipped bits are told too.
 
     Parameters
     ----------
     data : bytes or mmap
+    unpacks : bool
+        Whether the pixels of a TIFF packed with Deflate are unpacked, so that flipped bits are told
+        too.
 
     Returns
     -------
@@ -96,7 +98,8 @@ def is_cut(data: bytes | mmap.mmap) -> bool:
     if begins not in _TIFFS:
         return False
     try:
-        return any(not _is_there(data, *page) for page in _pages(data, _TIFFS[begins]))
+        pages = _pages(data, _TIFFS[begins])
+        return any(not _is_there(data, o, c, packed and unpacks) for o, c, packed in pages)
     except (struct.error, IndexError, KeyError, ValueError):
         return True
 

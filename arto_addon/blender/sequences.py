@@ -193,6 +193,20 @@ def damage_of(path: Path) -> str:
     return _damage(path, True, state_of(path))
 
 
+def incomplete(path: Path) -> str:
+    """Say in words which part of a picture's file is missing, without decoding it; "" for none."""
+    if not path.is_file():
+        return f"{path} is not there"
+    try:
+        if picture_files.kind_of(path) == "EXR":
+            exr.part_names(path)
+        elif picture_files.is_cut_file(path, unpacks=False):
+            return f"{path} is damaged or cut off"
+    except (OSError, ExrError) as e:
+        return str(e).partition(": ")[0]
+    return ""
+
+
 def state_of(path: Path) -> tuple[int, ...]:
     """What changes when a file is replaced; empty where there is none."""
     if not path.is_file():

@@ -29,7 +29,7 @@ from ..stage.stage import Stage, set_region
 from ..work import Progress, Render, Steps, Warned, Wrote
 from . import beside, planes, room
 from .asked import Asked, asked, begun
-from .check import check_patterns, check_room_of, check_scene
+from .check import check_patterns, check_room_of, check_scene, incomplete_images
 from .plan import ALIGNED, render_plan, strips_of
 from .planned import Given, Planned
 from .resume import empty, empty_take, finish, finish_field, let_go, unfinished
@@ -124,6 +124,8 @@ def _capture(
         stopped = head is not None
         if head and head.caution:
             yield Warned(0.0, f"CAUTION: {head.caution.text}")
+        for text in incomplete_images(this.found, scene.frame_current):
+            yield Warned(0.0, text)
         if head is None:
             _, head = yield from _begun(this, folder, given)
             empty(folder)

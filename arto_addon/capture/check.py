@@ -13,8 +13,10 @@ from ...core.errors import BusyError, SceneError
 from ...core.file_names import is_text
 from ...core.files import OLD, Lock, is_writable
 from ...core.fit.choice import check as check_choice
+from ..blender import sequences
 from ..blender.markers import camera_of
-from ..shot import paths
+from ..shot import external, paths
+from ..shot.fingerprint import Fingerprint, images_of
 from ..shot.home import check_outside
 from ..shot.shot import layer_of
 from ..stage.stage import picture_size
@@ -69,6 +71,17 @@ def check_room_of(folder: Path) -> None:
             for there in (folder / take / name, folder / take / (name + OLD)):
                 if os.path.lexists(there):
                     marked.check(there, None, folder)
+
+
+def incomplete_images(found: Fingerprint, frame: int) -> list[str]:
+    """Say which images of what is captured are missing or cut off, for which Blender shows others.
+
+    found: the scene's fingerprint.
+    """
+    images = [image for image in images_of(found) if image.filepath and not image.is_dirty]
+    files = [path for image in images for path in external.of_image(image, frame)]
+    told = [sequences.incomplete(path) for path in dict.fromkeys(files)]
+    return [f"{text}, and is captured as Blender shows it" for text in told if text]
 
 
 def check_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> None:

@@ -14,6 +14,7 @@ from types import TracebackType
 
 from ...core import exr, marked
 from ...core.errors import ExrError
+from ...core.file_names import folded
 from ...core.files import whole
 from ...core.places import in_turn
 from . import marks
@@ -81,7 +82,7 @@ class Together:
         if (prefix := older_prefix(self.plate)) is not None:  # of a relight that came meanwhile
             self._prefixes.add(prefix)
         for path in beside(self.plate, self._prefixes):
-            same = any(path.name.casefold() == there.name.casefold() for there in self.written)
+            same = any(folded(path) == folded(there) for there in self.written)
             if not same and marked.remove_own_file(path, lambda path: is_of(path, self.plate)):
                 self.removed.append(path)
 

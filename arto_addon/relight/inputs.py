@@ -32,42 +32,63 @@ class Input:
     """A file that is read, or all files of a sequence.
 
     what: in words; path: the file, or any file of the sequence; form: of the names of a sequence's
-    files, for `re.fullmatch`, or "".
+    files, for `re.fullmatch`, or ""; shown: whether Blender may only show it, so that it is no
+    input where it is a plate of ARTO's.
     """
 
     what: str
     path: Path
     form: str = ""
+    shown: bool = False
 
 
 class Inputs:
-    """The files that some pictures are made of; `over` tells whether a path is one of them."""
+    """The files that some pictures are made of; `over` tells whether a path is one of them.
+
+    A scene may have hundreds of files on a slow disk. They are looked at only where a name, or a
+    file that is there already, could be one of them.
+    """
 
     def __init__(self, inputs: Iterable[Input]) -> None:
-        self._named: dict[str, Input] = {}
-        self._same: dict[tuple[int, int], Input] = {}
-        self._forms: dict[tuple[str, str], tuple[re.Pattern[str], Input]] = {}
-        for one in inputs:
+        self._every = list(inputs)
+        self._named: dict[str, list[Input]] = {}
+        self._forms: list[tuple[re.Pattern[str], Input]] = []
+        for one in dict.fromkeys(self._every):
             if one.form:
-                key = folded(one.path.parent), one.form
-                self._forms.setdefault(key, (re.compile(_composed(one.form), re.IGNORECASE), one))
-                continue
-            self._named.setdefault(folded(one.path), one)
-            if found := _node(one.path):
-                self._same.setdefault(found, one)
+                form = re.compile(_composed(one.form), re.IGNORECASE)
+                self._forms.append((form, one))
+            else:
+                self._named.setdefault(_alike(one.path), []).append(one)
+        self._nodes: dict[tuple[int, int], list[Input]] | None = None
 
     def over(self, path: Path) -> Input | None:
         """The input that a file at a path would be written over, or None."""
-        here = _node(path)
-        if here in self._same:
-            return self._same[here]
-        if (one := self._named.get(folded(path))) and same_file(one.path, path):
-            return one
+        return next(
+            (one for one in self._found(path) if not one.shown or _is_others(one.path)), None
+        )
+
+    def _found(self, path: Path) -> Iterator[Input]:
+        for one in self._named.get(_alike(path), ()):
+            if same_file(one.path, path):
+                yield one
+        if here := _node(path):  # by another name: a link
+            yield from self._by_node().get(here, ())
         parent = folded(path.parent)
-        for (folder, _), (form, one) in self._forms.items():
-            if folder == parent and form.fullmatch(_composed(path.name)):
-                return one
-        return None
+        for form, one in self._forms:
+            if form.fullmatch(_composed(path.name)) and folded(one.path.parent) == parent:
+                yield one
+
+    def _by_node(self) -> dict[tuple[int, int], list[Input]]:
+        if self._nodes is None:
+            self._nodes = {}
+            for one in self._every:
+                if not one.form and (node := _node(one.path)):
+                    self._nodes.setdefault(node, []).append(one)
+        return self._nodes
+
+
+def _alike(path: Path) -> str:
+    return _composed(_composed(path.name).casefold())
 
 
 def _composed(name: str) -> str:
@@ -109,14 +130,11 @@ def _all(scene: bpy.types.Scene) -> Iterator[Input]:
         yield Input("the Cryptomattes", path, form if has_number(path) else "")
     if home.file():
         yield Input("the .blend", Path(home.file()))
-    # what else Blender reads, but for the plates that it shows, which may be gone
+    # what else Blender reads, or shows
     for source in [*bpy.data.images, *bpy.data.movieclips]:
-        path = _absolute(source)  # of tiles it is the name of none
-        if source.filepath and (source.source == "TILED" or _is_others(path)):
-            yield from _of_image("a file of the scene", source)
-    for path in map(Path, bpy.utils.blend_paths(absolute=True)):
-        if _is_others(path):
-            yield Input("a file of the scene", path)
+        yield from _of_image("a file of the scene", source, shown=source.source != "TILED")
+    for path in bpy.utils.blend_paths(absolute=True):
+        yield Input("a file of the scene", Path(path), shown=True)
     for volume in bpy.data.volumes:
         if volume.is_sequence:
             yield _sequence("a volume of the scene", _absolute(volume))
@@ -145,18 +163,20 @@ def _absolute(block: bpy.types.ID) -> Path:
     return Path(bpy.path.abspath(block.filepath, library=block.library))
 
 
-def _of_image(what: str, source: bpy.types.Image | bpy.types.MovieClip) -> Iterator[Input]:
-    """The files of an image or a clip."""
+def _of_image(
+    what: str, source: bpy.types.Image | bpy.types.MovieClip, shown: bool = False
+) -> Iterator[Input]:
+    """The files of an image or a clip. shown: see `Input`."""
     if source.source not in _IN_FILES or not source.filepath or getattr(source, "packed_file", 0):
         return
     path = _absolute(source)
     if source.source == "SEQUENCE":
-        yield _sequence(what, path)
+        yield _sequence(what, path, shown)
     elif source.source == "TILED":
-        yield Input(what, path, sequences.form_of_tiles(path.name))
+        yield Input(what, path, sequences.form_of_tiles(path.name), shown)
     else:
-        yield Input(what, path)
+        yield Input(what, path, shown=shown)
 
 
-def _sequence(what: str, path: Path) -> Input:
-    return Input(what, path, sequences.form_of(path.name))
+def _sequence(what: str, path: Path, shown: bool = False) -> Input:
+    return Input(what, path, sequences.form_of(path.name), shown)

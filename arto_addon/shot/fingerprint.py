@@ -171,6 +171,11 @@ def _blocks(
     return out
 
 
+def images_of(found: Fingerprint) -> list[bpy.types.Image]:
+    """The images that a fingerprint of the scene as it is has seen."""
+    return [image for image in bpy.data.images if _words(image) in found]
+
+
 def key_of(found: Fingerprint) -> str:
     """A short digest of a whole fingerprint, without what the viewport has worked out."""
     text = repr([(k, v) for k, v in found.items() if not k.startswith("=")])

@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 from arto.arto_addon import work
 from arto.arto_addon.blender.sequences import damage, form_of, form_of_tiles
+from arto.arto_addon.capture.capture import capture
+from arto.arto_addon.capture.check import incomplete_images
 from arto.arto_addon.relight import ahead, many, relight
 from arto.arto_addon.relight.shown import Shown
+from arto.arto_addon.shot.fingerprint import fingerprint
 from arto.arto_addon.world import hdris
 from arto.arto_addon.world.check import check_file, check_images
 from arto.core import exr
@@ -165,3 +168,22 @@ def test_forms_of_names():
     assert form_of_tiles("skin.<UDIM>.exr") == r"skin\.\d{4}\.exr"
     assert is_cut(b"II*\0" + bytes(4)) is False  # no page: nothing is missing
     assert is_cut(b"II*\0\xff\xff\xff\xff")
+
+
+def test_a_texture_that_is_cut_off_is_warned_of(tmp_path, scene):
+    """Blender renders grey or magenta in its place, and so does a capture."""
+    cut, gone = tmp_path / "cut.jpg", tmp_path / "gone.png"
+    cut.write_bytes(saved(tmp_path, "JPEG").read_bytes()[:-30])
+    exr.write(whole := tmp_path / "whole.exr", {"": NOISE})
+    nodes = scene.objects["Floor"].active_material.node_tree.nodes
+    for path in (cut, gone, whole):
+        image = bpy.data.images.new(path.name, 4, 4)
+        image.source, image.filepath = "FILE", str(path)
+        nodes.new("ShaderNodeTexImage").image = image
+    found = fingerprint(scene, scene.view_layers[0].name)
+    said = incomplete_images(found, 1)
+    assert len(said) == 2 and "cut.jpg is damaged" in said[0] and "gone.png is not there" in said[1]
+    steps = work.strictly(capture(scene, scene.view_layers[0].name))
+    with pytest.raises(StrictError, match=r"cut\.jpg"):
+        while not isinstance(next(steps), work.Render):
+            pass
