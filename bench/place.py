@@ -177,12 +177,15 @@ def place(
             level, smooth = (0.8, 3) if rough else (0.5, 1)
             level = 0.985 if name == "matt" else level
             off = off_the_click(shown, mask, level, smooth, (x, y))
+            grey = _smooth(shown.mean(axis=-1) * mask, 3)
             aim = mirrored if what is What.REFLECT else normal
             rows.append(
                 {
                     **{"scene": name, "what": what.value.lower(), "x": x, "y": y},
                     "pixels_off": off,
                     "degrees_off": apart(placed.direction, aim),
+                    # the brightness of the place, of the brightest one of the thing
+                    "of_brightest": float(grey[y, x] / grey.max()),
                     **{"by": placed.by, "updates_per_second": speed},
                 }
             )

@@ -162,3 +162,19 @@ def test_nodes_around_a_kit_are_as_fine_as_they_are(world: bpy.types.World) -> N
     noise = tree.nodes.new("ShaderNodeTexNoise")
     tree.links.new(noise.outputs[0], kits.nodes_of(world)[0].inputs["Under"])
     assert detail(world) == FINEST
+
+
+def test_a_keyed_and_a_driven_light_is_that_of_its_frame(world: bpy.types.World) -> None:
+    scene = bpy.context.scene
+    kits.write(world, Kit((Light("a", Kind.ROUND, width=60.0, height=60.0),)))
+    socket = kits.node_of(world, "a").inputs["Strength"]
+    for frame, value in ((1, 1.0), (11, 3.0)):
+        socket.default_value = value
+        socket.keyframe_insert("default_value", frame=frame)
+    kits.node_of(world, "a").inputs["Stops"].driver_add("default_value").driver.expression = "1"
+    solid_angle = 2 * math.pi * (1 - math.cos(math.radians(30.0)))
+    for frame, value in ((1, 1.0), (6, 2.0), (11, 3.0)):
+        scene.frame_set(frame)
+        assert kits.read(world).light("a").strength == pytest.approx(value)
+        found = bake(scene, 64).irradiance()[0]
+        assert found == pytest.approx(2 * value * solid_angle, rel=0.01)
