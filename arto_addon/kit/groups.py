@@ -113,7 +113,7 @@ def _marked(tree: bpy.types.NodeTree, kind: str, blend: str) -> bpy.types.NodeTr
 
 
 def _there(kind: str, blend: str) -> bpy.types.NodeTree | None:
-    trees = (t for t in bpy.data.node_groups if t.bl_idname == "ShaderNodeTree")
+    trees = (t for t in bpy.data.node_groups if t.bl_idname == "ShaderNodeTree" and not t.library)
     return next((t for t in trees if t.get(MARK) and _said(t) == (kind, blend)), None)
 
 

@@ -35,6 +35,8 @@ from .base import DIRECTION, TURN, number, place_node, put
 OUT, CAMERA, RAYS = "ARTO Kit", "ARTO Kit Camera", "ARTO Kit Rays"
 # The node whose colour multiplies all light is that of the slider *Tint* (`world.controls`).
 TINTED, TINT = "ARTO Kit Tinted", "ARTO Tint"
+# The node that the slider *Strength* adds to worlds without a strength of their own.
+STRENGTH = "ARTO Strength"
 _OWN = {DIRECTION, TURN, TINTED, TINT, OUT, CAMERA, RAYS}
 # What a light's node says beside its values.
 ON, SOLO, LOCK = "arto_on", "arto_solo", "arto_lock"
@@ -188,8 +190,9 @@ def put_in(world: bpy.types.World) -> Kit:
     tree.links.new(out.outputs[0], end.inputs["Surface"])
     turn = of_base.direction(tree)
     turn.location = out.location[0] - 900, out.location[1] - 300
-    if TINT in tree.nodes:  # it goes on tinting what is the base now
-        tree.nodes[TINT].name = "ARTO Base Tint"
+    for dial in (TINT, STRENGTH):  # they go on changing what is the base now
+        if dial in tree.nodes:
+            tree.nodes[dial].name = dial.replace("ARTO", "ARTO Former")
     tint = tree.nodes.new("ShaderNodeRGB")
     tint.name = tint.label = TINT
     tint.outputs[0].default_value = (1.0, 1.0, 1.0, 1.0)
@@ -267,10 +270,10 @@ def _write_light(node: bpy.types.Node, light: Light, image: bpy.types.Image | No
     for name, value in ((ON, light.on), (SOLO, light.solo), (LOCK, light.lock)):
         if bool(node.get(name, name == ON)) != value:
             node[name] = value
-    if light.kind is Kind.PICTURE:
-        texture = groups.picture_node(node.node_tree)
-        if texture.image != image:
-            texture.image = image
+    if light.kind is Kind.PICTURE and groups.picture_node(node.node_tree).image != image:
+        if node.node_tree.users > 1:  # a copy of the world has it too
+            node.node_tree = groups.light_group(light.kind, light.blend)
+        groups.picture_node(node.node_tree).image = image
 
 
 def set_light(node: bpy.types.Node, light: Light) -> None:

@@ -11,15 +11,17 @@ import numpy as np
 from ...core.errors import KitError, SceneError
 from ...core.kit.light import Blend, Kind, Light
 from ...core.kit.shine import aimed
+from ...core.light.environment import Environment
 from ...core.place.lobes import lobes_at
 from ...core.place.place import Placed, What, facing, grazing, normal_at, reflected, shading
 from ..blender.markers import camera_of
 from ..kit import kit as kits
 from ..relight.shown import Shown
 from ..shot.shot import layer_of
-from ..world import kept
+from ..world import dials, kept
 from ..world.check import check_world, world_of
 from .image import view_of
+from .quick import Quick
 
 # The cosine up to which a shaded normal is that of the surface itself.
 _ALIKE = 0.9
@@ -43,12 +45,13 @@ class Placer:
         there = self.field.has_layer("position")
         self._position = self.field.layer("position") if there else None
         self._normal = self.field.layer("normal") if self.field.has_layer("normal") else None
-        # The light as it is now: a flag is put before it.
-        check_world(scene, layer)
-        self._light = kept.environment(scene, 512, layer)
+        self._light: Environment | None = None
 
-    def at(self, x: int, y: int, what: What) -> Placed:
-        """Where a light is to stand for a pixel, from the left and the top. Raises FieldError."""
+    def at(self, x: int, y: int, what: What, without: str = "") -> Placed:
+        """Where a light is to stand for a pixel, from the left and the top.
+
+        without: the light that is put there. Raises FieldError.
+        """
         lobes = lobes_at(self.field, x, y)
         eye = self._view[y, x] if self._view is not None else None
         normal = self._normal_at(x, y, eye)
@@ -57,6 +60,8 @@ class Placer:
         if what is What.LIGHT:
             return facing(lobes, normal)
         if what is What.SHADE:
+            # The light without the flag, which must not hide what it is to hide.
+            self._light = self._light or light_of(self.scene, without)
             return shading(lobes, self._light)
         if eye is None:
             raise SceneError("a rim light needs the camera's view: a panorama has none")
@@ -86,6 +91,20 @@ class Placer:
     def close(self) -> None:
         """Let go of the field's files."""
         self.field.close()
+
+
+def light_of(scene: bpy.types.Scene, without: str) -> Environment:
+    """The light of a scene's world, as coarse as a flag needs. Raises SceneError.
+
+    without: the name of a light that is left out, where the world is all a kit.
+    """
+    layer = layer_of(scene)
+    world = check_world(scene, layer)
+    image = Quick().map_of(world, without)
+    if image is None:
+        return kept.environment(scene, 512, layer)
+    strength, turn, _ = dials.read(world)
+    return Environment(image * np.float32(strength), turn)
 
 
 def new_light(scene: bpy.types.Scene, what: What, placed: Placed) -> str:
@@ -128,7 +147,7 @@ class Gesture:
 
     def move(self, x: int, y: int) -> Light:
         """Put the light where it shines at a pixel. Raises FieldError, KitError."""
-        placed = self.placer.at(x, y, self.what)
+        placed = self.placer.at(x, y, self.what, self.light)
         if not self.light:
             self.light = new_light(self.scene, self.what, placed)
         return change(self.scene, self.light, placed=placed)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import KitError
 from ...core.kit.light import Kind
-from ...core.kit.model import Base, BaseKind
+from ...core.kit.model import Base, BaseKind, Kit
 from ...core.kit.shine import base_map, map_of
 from ...core.light.environment import Environment
 from ..blender.colour import working_space
@@ -30,9 +30,10 @@ class Quick:
     def __init__(self) -> None:
         self._base: tuple[object, NDArray[np.float64]] | None = None
 
-    def map_of(self, world: bpy.types.World) -> NDArray[np.float32] | None:
+    def map_of(self, world: bpy.types.World, without: str = "") -> NDArray[np.float32] | None:
         """The map (H, W, 3) of a world at strength 1, not turned.
 
+        without: the name of a light that is left out.
         None for a world that only Cycles can tell: not all of it is a kit, nodes work out a value,
         or there are pictures whose colours have to be converted.
         """
@@ -47,7 +48,8 @@ class Quick:
         behind = self._behind(kit.base)
         if behind is None:
             return None
-        plain = kit.__class__(kit.lights, kit.base, tint=kit.tint)
+        lights = tuple(light for light in kit.lights if light.name != without)
+        plain = Kit(lights, kit.base, tint=kit.tint)
         return map_of(plain, ROWS, behind).image
 
     def _behind(self, base: Base) -> NDArray[np.float64] | None:

@@ -24,6 +24,8 @@ def light(scene: bpy.types.Scene, layer: str, options: dict[str, Any]) -> None:
     Raises KitError, SceneError, FilesError, OptionError.
     """
     file: Path | None = options["json"]
+    if file is None and options["hdri"] is None:
+        raise OptionError("light: name a kit's file by --json, or an HDRI to write by --hdri")
     said = str(file) == "-"
     if file is not None and not said and file.is_file() and not options["write"]:
         give(scene, layer, file.resolve())

@@ -8,10 +8,13 @@ when a slider is moved.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import bpy
 
+from ...core.kit.model import BaseKind
 from ..blender.nodes import shader_tree, world_of_nodes
+from ..kit import base, kit
 from .dials import backgrounds, put_in_scaler, scaler, turn, turn_to, why_not_turned
 
 __all__ = ["turn"]
@@ -102,18 +105,25 @@ def hdri(world: bpy.types.World) -> bpy.types.Image | None:
 
 
 def texture_nodes(world: bpy.types.World) -> list[bpy.types.Node]:
-    """The nodes of a world's own tree that show an HDRI."""
+    """The nodes of a world's own tree that show an HDRI, without that of a light kit's backdrop."""
     tree = shader_tree(world)
     kind = "ShaderNodeTexEnvironment"
-    return [n for n in tree.nodes if n.bl_idname == kind] if tree else []
+    found = [n for n in tree.nodes if n.bl_idname == kind] if tree else []
+    return [n for n in found if n.name != f"{base.BACKDROP} HDRI"]
 
 
 def set_hdri(world: bpy.types.World, image: bpy.types.Image) -> None:
     """Light a world with an HDRI.
 
     The first environment texture shows the HDRI. Without such a node, a new one is linked to the
-    background.
+    background. In a light kit the HDRI is the base. Raises KitError for a kit that is linked, or
+    whose values other nodes work out.
     """
+    if kit.has(world):
+        found = kit.read(world)
+        new = replace(found.base, kind=BaseKind.HDRI, image=base.text_of(image))
+        kit.write(world, replace(found, base=new))
+        return
     nodes = texture_nodes(world)
     if nodes:
         nodes[0].image = image

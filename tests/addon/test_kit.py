@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from arto.arto_addon.blender.nodes import new_world
 from arto.arto_addon.kit import kit as kits
-from arto.arto_addon.world import dials
+from arto.arto_addon.world import controls, dials
 from arto.arto_addon.world.bake import bake
 from arto.arto_addon.world.detail import FINEST, detail
 from arto.core.errors import KitError
@@ -63,6 +63,13 @@ def test_what_a_world_shows_becomes_the_base(world: bpy.types.World) -> None:
     assert np.allclose(bake(bpy.context.scene, 32).image, before, rtol=1e-5)
     assert "Other nodes" in dials.why_not_turned(world)
     assert detail(world) == 1
+    # the slider now scales all of it
+    controls.set_strength(world, 2.0)
+    assert kits.read(world).strength == 2.0 and kits.read(world).base == kit.base
+    # and an HDRI that is opened takes the place of the other nodes
+    image = bpy.data.images.new("opened", 8, 4, float_buffer=True)
+    controls.set_hdri(world, image)
+    assert kits.read(world).base == Base(BaseKind.HDRI, "opened") and kits.is_whole(world)
 
 
 def test_an_hdri_that_is_turned_becomes_the_base(world: bpy.types.World) -> None:
