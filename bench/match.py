@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from . import reference, worlds
 from .accuracy import ARTO, Shot, code_key
 from .machine import write_rows
+from .pictures import display, exposure_for, plt
 from .worlds import World
 
 SCENES = ("four_spheres", "product", "soft", "window")
@@ -83,10 +84,32 @@ def _true_plate(shot: Shot, world: World) -> NDArray[np.float32]:
     return found
 
 
+def _sheet(path: Path, cases: list[tuple[list[NDArray], list[str]]]) -> None:
+    """A row of pictures for each case; the last two are maps, shown at their own exposure."""
+    figure, axes = plt.subplots(
+        len(cases), 5, figsize=(15, 2.4 * len(cases)), layout="constrained", squeeze=False
+    )
+    for row, (pictures, titles) in zip(axes, cases, strict=True):
+        shot, sky = exposure_for(pictures[1]), exposure_for(pictures[4])
+        for i, (axis, picture, title) in enumerate(zip(row, pictures, titles, strict=True)):
+            axis.imshow(display(np.maximum(picture, 0), sky if i > 2 else shot))
+            axis.set_title(title, fontsize=9)
+            axis.set_axis_off()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=80)
+    plt.close(figure)
+
+
 def match(
-    out: Path, scene_names: Iterable[str], hdris: Iterable[str], size: tuple[int, int], samples: int
+    out: Path,
+    scene_names: Iterable[str],
+    hdris: Iterable[str],
+    size: tuple[int, int],
+    samples: int,
+    sheet: Path | None = None,
 ) -> list[dict[str, Any]]:
-    """A row for each scene and hidden world, written after each."""
+    """A row for each scene and hidden world, written after each. sheet: a picture of them all."""
+    cases: list[tuple[list[NDArray], list[str]]] = []
     rows: list[dict[str, Any]] = []
     names = worlds.hdri_names()
     maps: dict[str, Environment] = {}
@@ -105,7 +128,9 @@ def match(
                 scene_name, world, size, SAMPLES, 1, shot.scene, denoise=True
             )
             seen = target.alpha > 0.999
+            begun = time.process_time()
             found, answers, seconds = matched(shot, target.rgb, maps[start])
+            cpu = time.process_time() - begun
             assert found.environment is not None
             plate = shot.arto(Found("found", light=found.environment))
             error = mean_relative_error(plate, target.rgb, seen)
@@ -116,6 +141,7 @@ def match(
                     "world": name,
                     "start": start,
                     "seconds": seconds,
+                    "cpu_seconds": cpu,
                     "error": error,
                     "error_of_the_true_world": least,
                     "light_error": light_error(answers.cells, found.environment, maps[name]),
@@ -126,6 +152,12 @@ def match(
                 }
             )
             write_rows(out, rows)
+            if sheet:
+                shown = [shot.arto(World(start)), target.rgb, plate]
+                shown += [found.environment.image, maps[name].image]
+                titles = [f"{scene_name} in {start}", f"target: in {name}", "in the light found"]
+                cases.append((shown, [*titles, "the light found", name]))
+                _sheet(sheet, cases)
             print({k: round(v, 3) if isinstance(v, float) else v for k, v in rows[-1].items()})
     return rows
 

@@ -15,6 +15,7 @@ def add(commands: Any) -> None:
     c.add_argument("--worlds", nargs="+", help="those that are hidden, of Blender's HDRIs")
     c.add_argument("--width", type=int, default=240)
     c.add_argument("--samples", type=int, default=64, help="of the captures")
+    c.add_argument("--sheet", type=Path, help="a PNG of all cases, to write")
     c.set_defaults(run=_run)
 
 
@@ -24,4 +25,12 @@ def _run(options: argparse.Namespace) -> None:
 
     size = (options.width, options.width * 3 // 4)
     hdris = options.worlds or worlds.hdri_names()
-    print(table(match(options.json, options.scenes or SCENES, hdris, size, options.samples)))
+    rows = match(
+        options.json,
+        options.scenes or SCENES,
+        hdris,
+        size,
+        options.samples,
+        options.sheet,
+    )
+    print(table(rows))

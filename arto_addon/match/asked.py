@@ -10,11 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core import exr
-from ...core.errors import ArtoError, TargetError
+from ...core.errors import ArtoError, SceneError, TargetError
 from ...core.match.target import fitting
 from ..blender import sequences
 from ..blender.colour import working_space
+from ..plate.names import relit_file
+from ..plate.plate import shown_file
 from ..shot import home
+
+# The image that a plate is painted over in.
+PAINTED = "ARTO Painted Target"
 
 
 @dataclass(frozen=True)
@@ -158,6 +163,27 @@ def _converted(pixels: NDArray[np.float64], space: str, name: str) -> NDArray[np
     colour = np.ascontiguousarray(pixels[..., :3], np.float32)
     processor.applyRGB(colour)
     return np.concatenate([colour.astype(np.float64), pixels[..., 3:]], axis=-1)
+
+
+def paint_over(scene: bpy.types.Scene) -> bpy.types.Image:
+    """Make the target an image to paint on, which begins as the plate. Raises SceneError, ExrError.
+
+    The image has no alpha: what is painted counts, wherever it is.
+    """
+    path = relit_file(scene)
+    if not path.is_file():
+        raise SceneError(f"there is no plate {path} to paint over: relight first")
+    plate = next(iter(exr.read(shown_file(path, exr.header(path))).values()))
+    height, width = plate.shape[:2]
+    image = bpy.data.images.new(PAINTED, width, height, alpha=False, float_buffer=True)
+    image.colorspace_settings.name = working_space()
+    image.use_view_as_render = True
+    pixels = np.ones((height, width, 4), np.float32)
+    pixels[..., :3] = plate[::-1, :, :3]
+    image.pixels.foreach_set(pixels.ravel())
+    image.update()
+    scene.arto.match_target, scene.arto.match_image = "", image
+    return image
 
 
 def what(scene: bpy.types.Scene) -> str:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..blender.editors import Editor, reveal
+from ..blender.editors import Editor, editors, reveal
 from ..match import apply, region
-from ..match.asked import what
+from ..match.asked import paint_over, what
 from ..match.found import match_file
 from ..plate.names import relit_file
 from ..work import Steps
@@ -53,6 +53,27 @@ class ARTO_OT_even_out(LongWork):
         return apply.even_out_and_apply(scene, view_layer)
 
 
+class ARTO_OT_paint_over(Quick):
+    """Make the target a copy of the relit picture, to paint on: lighter, darker, warmer, cooler. \
+Match then finds the light of it"""
+
+    bl_idname = "arto.paint_over"
+    bl_label = "Paint Over"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return free(cls) and can_relight(cls, context)
+
+    def work(self, context: bpy.types.Context) -> str:
+        image = paint_over(context.scene)
+        reveal(image)
+        for editor in editors():
+            if editor.image == image:
+                editor.space.mode = "PAINT"
+        return "paint on the picture, then press Match"
+
+
 class ARTO_OT_where_from(Picking):
     """Click a place of the relit picture: says which lights light it, and from where"""
 
@@ -86,4 +107,10 @@ it has less"""
         return "grey is where the light makes all of the target"
 
 
-CLASSES = (ARTO_OT_match, ARTO_OT_even_out, ARTO_OT_where_from, ARTO_OT_show_missing)
+CLASSES = (
+    ARTO_OT_match,
+    ARTO_OT_even_out,
+    ARTO_OT_paint_over,
+    ARTO_OT_where_from,
+    ARTO_OT_show_missing,
+)

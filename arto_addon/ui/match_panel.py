@@ -20,6 +20,7 @@ class MatchPanel(Draws):
         row = column.row()
         row.enabled = not settings.match_target
         row.prop(settings, "match_image", text="")
+        column.operator("arto.paint_over", icon="BRUSH_DATA")
         column.prop(settings, "match_mask")
         column.prop(settings, "match_keep")
         column.prop(settings, "match_change")

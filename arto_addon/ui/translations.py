@@ -38,6 +38,7 @@ The light of frame {now}, on the shot of frame {was} | Das Licht von Bild {now},
 Live shows the shot that it was switched on for: this is another one | Live zeigt die Einstellung, für die es eingeschaltet wurde: dies ist eine andere | ライブは、オンにしたときのショットを表示します。これは別のショットです
 As in a Picture | Wie auf einem Bild | 写真のように
 Match | Angleichen | マッチ
+Paint Over | Übermalen | 上から描く
 Even Out | Ausgleichen | 均一にする
 Where From | Woher | どこから
 What No Light Makes | Was kein Licht macht | どの光でも作れない部分

@@ -12,7 +12,7 @@ from arto.arto_addon.blender.nodes import new_world
 from arto.arto_addon.capture.capture import capture
 from arto.arto_addon.kit import kit as kits
 from arto.arto_addon.match import apply, region
-from arto.arto_addon.match.asked import asked, pixels_of
+from arto.arto_addon.match.asked import asked, paint_over, pixels_of
 from arto.arto_addon.match.found import match_file, read
 from arto.arto_addon.match.match import even_out, match_target
 from arto.arto_addon.plate.names import relit_file
@@ -182,6 +182,21 @@ def test_what_is_behind_the_things_does_not_count(shot, hidden, tmp_path) -> Non
     as_target(shot, tmp_path, target)
     shot.arto.match_mask = mask
     assert read(work.run(match_target(shot, LAYER))).error < 0.05
+
+
+def test_a_plate_that_is_painted_over_is_a_target(shot, hidden) -> None:
+    """Painted warmer all over: the light is warmer."""
+    plate_of(shot)
+    image = paint_over(shot)
+    assert tuple(image.size) == (24, 18) and shot.arto.match_image == image
+    pixels = np.empty(24 * 18 * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    pixels.reshape(-1, 4)[:, :3] *= (1.3, 1.0, 0.7)
+    image.pixels.foreach_set(pixels)
+    shot.arto.own_lamps = 0.0
+    found = apply.apply(shot, work.run(match_target(shot, LAYER)))
+    red, _, blue = exr.read(Path(found.world))[""].mean(axis=(0, 1))
+    assert red / blue > 1.4
 
 
 def test_a_region_says_where_its_light_is_from(shot) -> None:
