@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import bpy
@@ -17,6 +18,7 @@ from arto.arto_addon.match.found import match_file, read
 from arto.arto_addon.match.match import even_out, match_target
 from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.relight.relight import compute
+from arto.arto_addon.ui import cli
 from arto.arto_addon.world import controls
 from arto.core import exr
 from arto.core.errors import TargetError
@@ -103,6 +105,18 @@ def test_a_hidden_worlds_own_plate_comes_back(shot, hidden, tmp_path) -> None:
     again = apply.apply(shot, work.run(match_target(shot, LAYER)))
     assert again.look == "Matched 2" and again.world != found.world
     assert Path(found.world).is_file()
+
+
+def test_the_command_matches(shot, hidden, tmp_path) -> None:
+    path = as_target(shot, tmp_path, plate_of(shot, hidden))
+    report = tmp_path / "report.json"
+    made = cli.main(["match", str(path), "--match-near", "0.1", "--json", str(report)])
+    assert made == 0
+    assert shot.arto.look == "Matched"
+    assert [Path(p).name for p in json.loads(report.read_text())["wrote"]] == [
+        "shot_relit_Matched_world.exr"
+    ]
+    assert cli.main(["match", str(tmp_path / "none.exr")]) == 1
 
 
 def test_a_shadow_without_a_cause_is_told(shot, hidden, tmp_path) -> None:
