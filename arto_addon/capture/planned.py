@@ -128,7 +128,8 @@ def planned(
         kept = False
         check_choice(settings.support, patterns, settings.separate)
         tiles, estimate = estimated(kept)
-    yield Progress(0.0, f"this capture: {estimate.line}")
+    scene_too = f", beside {size(on.scene_bytes)} for the scene" if on.scene_bytes else ""
+    yield Progress(0.0, f"this capture: {estimate.line}{scene_too}")
     if on.is_kept and room.lacks_memory(estimate.memory):
         on.let_go()
         yield Progress(0.0, "memory is short: Cycles prepares the scene again for each render")

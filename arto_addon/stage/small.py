@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -63,16 +64,18 @@ def parts_of(
             yield request
         request.check()
         on.pace = laps.pace(on)
+        on.scene_bytes = max(on.scene_bytes, laps.scene_bytes)
         with exr.Layers(path) as there:
             return {n: np.array(there.read(n)) for n in there.names if n.endswith(only)}
 
 
 class _Laps:
     """When a render began, and when its first and last paths were traced: seconds, and seconds of
-    all threads."""
+    all threads. scene_bytes: what the scene takes."""
 
     def __init__(self) -> None:
         self.begun = self.traced = self.written = _now()
+        self.scene_bytes = 0
 
     def pace(self, on: Stage) -> Pace:
         """How fast the stage renders, by this render and those before it."""
@@ -101,6 +104,18 @@ def threads(scene: bpy.types.Scene) -> int:
     return os.cpu_count() or 1
 
 
+_MEMORY = re.compile(r"Mem: ?([\d.]+)([KMG])")
+
+
+def _bytes_in(says: str) -> int:
+    """The memory that a line of Cycles' status tells last, in bytes; 0 where it tells none."""
+    found = _MEMORY.findall(says)
+    if not found:
+        return 0
+    number, unit = found[-1]
+    return int(float(number) * {"K": 2**10, "M": 2**20, "G": 2**30}[unit])
+
+
 @contextmanager
 def _timed() -> Iterator[_Laps]:
     """Time a render's stages, which Cycles' status lines tell apart."""
@@ -111,6 +126,7 @@ def _timed() -> Iterator[_Laps]:
         says = str(arguments[0]) if arguments else ""
         if "Sample" in says or "Finished" in says:
             traced.append(_now())
+            laps.scene_bytes = max(laps.scene_bytes, _bytes_in(says))
 
     bpy.app.handlers.render_stats.append(told)
     try:

@@ -53,6 +53,7 @@ class Stage:
         self.portals: bool | None = None
         self.own_groups: list[str] = []  # The artist's light groups that have objects.
         self._made: list[bpy.types.ID] = []
+        self.scene_bytes = 0  # What Cycles says that the scene takes which it has prepared.
         self._longest = 0  # The most samples that the scene which Cycles keeps was rendered with.
 
     def made(self, block: _Block) -> _Block:

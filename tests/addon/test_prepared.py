@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from arto.arto_addon import work
+from arto.arto_addon.capture import planned
 from arto.arto_addon.capture.capture import capture
 from arto.arto_addon.stage.stage import Stage
 from arto.core import exr
@@ -53,3 +54,15 @@ def test_a_capture_in_tiles_is_prepared_twice_and_is_the_same_to_the_bit(tmp_pat
     assert anew.prepared_times == anew.renders == kept.renders
     for one, other in zip(kept_layers, layers_anew, strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def test_a_scene_that_finds_no_room_is_prepared_for_each_tile_with_a_word(tmp_path, monkeypatch):
+    scene = small_scene(tmp_path)
+    scene.arto.memory, scene.arto.samples, scene.arto.far = 1, 1, False
+    scene.render.resolution_y = 72
+    monkeypatch.setattr(planned.room, "lacks_memory", lambda _: True)
+    said: list[str] = []
+    with counted() as count:
+        work.run(capture(scene, scene.view_layers[0].name), lambda step: said.append(step.text))
+    assert count.prepared_times == count.renders > 1
+    assert any("memory is short" in text for text in said)
