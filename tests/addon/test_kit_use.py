@@ -8,8 +8,12 @@ from dataclasses import replace
 import bpy
 import numpy as np
 import pytest
+from arto.arto_addon import work
 from arto.arto_addon.blender.output import float_exr
+from arto.arto_addon.capture import capture
+from arto.arto_addon.fit import fit
 from arto.arto_addon.kit import kit as kits
+from arto.arto_addon.live import placing
 from arto.arto_addon.live.quick import Quick
 from arto.arto_addon.relight import kit_out
 from arto.arto_addon.ui import cli
@@ -19,12 +23,15 @@ from arto.arto_addon.world.bake import bake
 from arto.arto_addon.world.kept import shows
 from arto.arto_addon.world.studio import render
 from arto.core import exr
-from arto.core.errors import KitError
+from arto.core.errors import FieldError, KitError
 from arto.core.kit import kit_file
 from arto.core.kit.light import Blend, Kind, Light
 from arto.core.kit.model import Base, BaseKind, Kit
 from arto.core.kit.presets import PRESETS, preset
 from arto.core.light.environment import Environment
+from arto.core.place.place import What
+from bpy_extras.object_utils import world_to_camera_view
+from mathutils import Vector
 from scene_tools import small_scene
 
 KEY = Light("Key", azimuth=-60.0, elevation=40.0, width=40.0, height=30.0, strength=5.0)
@@ -208,3 +215,37 @@ def test_an_appended_kit_is_the_kit_and_a_linked_one_is_left_alone(scene, tmp_pa
         else:
             kits.write(world, kit.with_light(replace(KEY, stops=1.0)))
             assert kits.read(scene.world) == kit
+
+
+def test_a_light_is_put_moved_and_put_back(scene) -> None:
+    """The tool without its mouse, on the front of the glossy box."""
+    settings = scene.arto
+    settings.samples, settings.patches, settings.keep = 32, 2, "never"
+    scene.render.film_transparent = True
+    layer = scene.view_layers[0].name
+    work.run(capture.capture(scene, layer))
+    work.run(fit.fit(scene, layer))
+    before = kits.read(scene.world)
+    gesture = placing.Gesture(scene, What.LIGHT)
+    box = scene.objects["Glossy"].matrix_world.translation
+    seen = world_to_camera_view(scene, scene.camera, box + Vector((0.0, -1.0, 0.0)))
+    x, y = int(seen.x * 24), int((1 - seen.y) * 18)
+    light = gesture.move(x, y)
+    assert light.name == "Light" and gesture.light == "Light"
+    # its front looks along -Y
+    assert abs((light.azimuth + 90 + 180) % 360 - 180) < 25 and abs(light.elevation) < 25
+    gesture.change(size=1.5, roll=10.0, stops=1.0)
+    changed = kits.read(scene.world).light("Light")
+    assert changed.sides[0] == pytest.approx(1.5 * light.sides[0], rel=1e-4)
+    assert (changed.roll, changed.stops) == (light.roll + 10, light.stops + 1)
+    gesture.back()
+    gesture.close()
+    assert kits.read(scene.world) == before
+    # a locked light is moved by no tool, and a place without things says so
+    kits.write(scene.world, Kit((replace(KEY, lock=True),)))
+    with pytest.raises(KitError, match="locked"):
+        placing.Gesture(scene, What.REFLECT, "Key")
+    gesture = placing.Gesture(scene, What.REFLECT)
+    with pytest.raises(FieldError):
+        gesture.move(0, 0)
+    gesture.close()
