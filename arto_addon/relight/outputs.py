@@ -16,7 +16,7 @@ from ..plate.footage import footage
 from ..plate.marks import ENDINGS, SCRIPTS
 from ..shot.home import check_outside
 from . import layers
-from .inputs import Inputs, inputs
+from .inputs import Input, Inputs, inputs
 from .shown import Shown
 
 # How small compressed files of pictures are, as a share of their pixels, where they are small: a
@@ -70,7 +70,11 @@ def check_beside(
     would be written over one of these or over a file of others.
     """
     check_outside(path, "pictures")
-    if found := inputs(scene, read).over(path):
+    found = Inputs(Input("what it is made of", file) for file in read).over(path)
+    if found is None and not marks.is_of(path, plate_path):
+        # the world of an earlier match may be written anew: its light is known by now
+        found = inputs(scene).over(path)
+    if found:
         raise SceneError(f"{path} is {found.what}, and is not written over: choose another file")
     marks.check(path, plate_path, scene.arto.overwrite)
 
