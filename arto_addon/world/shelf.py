@@ -89,16 +89,19 @@ def forget() -> None:
 
 
 def note(path: str) -> None:
-    """Remember an HDRI as the one that was used last. What cannot be written is not remembered."""
+    """Remember an HDRI as the one that was used last. What cannot be written is not remembered.
+
+    What is known keeps its place until Blender is started anew: nothing moves under the mouse.
+    """
     item = Item(str(Path(bpy.path.abspath(path)).absolute()))
-    known = [item, *(i for i in _recent if i != item)]
-    if known == _recent:
-        return
+    if item not in items():
+        _recent.insert(0, item)
     file = _file()
-    known = list(dict.fromkeys([*known, *_read(file)]))[:MOST_RECENT]
-    _recent[:] = known
-    with contextlib.suppress(OSError), whole(file) as partial:
-        partial.write_text(json.dumps([i.path for i in known if not i.world]), encoding="utf-8")
+    before = _read(file)
+    now = list(dict.fromkeys([item, *before]))[:MOST_RECENT]
+    if now != before:
+        with contextlib.suppress(OSError), whole(file) as partial:
+            partial.write_text(json.dumps([i.path for i in now]), encoding="utf-8")
 
 
 def note_shown(scene: bpy.types.Scene) -> None:

@@ -86,6 +86,10 @@ def test_the_last_hdris_are_remembered(library, tmp_path):
     file = tmp_path / "config" / shelf.RECENT
     names = [path.rsplit("/", 1)[-1] for path in json.loads(file.read_text())]
     assert names[:3] == ["7.exr", "sky.exr", "14.exr"] and len(names) == shelf.MOST_RECENT
+    # what is shown stays where it is until Blender is started anew
+    shown = shelf.items()
+    shelf.note(shown[5].path)
+    assert shelf.items() == shown
     shelf._recent.clear()
     assert looked()[0] == shelf.Item(str(library / "sky.exr"))
     assert len(shelf._recent) == 1
