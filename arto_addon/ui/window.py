@@ -106,7 +106,7 @@ def show_matched(job: SecondBlender) -> str:
     with bpy.context.temp_override(window=window):
         found = apply.apply(scene, path)
         bpy.ops.ed.undo_push(message="ARTO Match")
-    return found.words
+    return f"{found.words}. The light is a look: press Relight to see it"
 
 
 # Images that only the window needs: they are removed before the file is saved.
