@@ -176,7 +176,8 @@ def begun(
     look, others = "", dict[str, object]()
     if given is None:
         look = key_of_look(this.head, this.hemicube, this.shot, this.found)
-        given = looked_before(place, look) if place else None
+        on_cpu = this.scene.cycles.device == "CPU"
+        given = looked_before(place, look, on_cpu) if place else None
         if given:
             hemicube = given.hemicube
         if given and given.caution:

@@ -10,6 +10,7 @@ import contextlib
 import hashlib
 import json
 import math
+import os
 from dataclasses import astuple, fields, replace
 from pathlib import Path
 
@@ -52,20 +53,30 @@ def noted(key: str, pace: Pace | None) -> dict[str, object]:
     return said
 
 
-def looked_before(place: Path, key: str) -> Given | None:
-    """What a capture in the folder of a shot found by a look with this key; None for no such."""
+def looked_before(place: Path, key: str, on_cpu: bool) -> Given | None:
+    """What a capture in the folder of a shot found by a look with this key; None for no such.
+
+    on_cpu: whether Cycles renders on the processor, which other programs use too.
+    """
     for path in sorted(place.glob(f"*/{HEADER}")):
         # a set that is damaged is told of where it is used
         with contextlib.suppress(ArtoError, OSError):
             head = heads.read(path.parent)
             if head.others.get(LOOKED) == key and head.route is not None:
-                return Given(head.hemicube, head.route, head.caution, _pace(head.others.get(PACE)))
+                return Given(
+                    head.hemicube, head.route, head.caution, _pace(head.others.get(PACE), on_cpu)
+                )
     return None
 
 
-def _pace(said: object) -> Pace | None:
+def _pace(said: object, on_cpu: bool) -> Pace | None:
     if not isinstance(said, list) or len(said) != len(fields(Pace)):
         return None
     if not all(isinstance(v, float | int) and math.isfinite(v) and v >= 0 for v in said):
         return None
-    return Pace(*map(float, said))
+    pace = Pace(*map(float, said))
+    if not on_cpu or not hasattr(os, "getloadavg"):
+        return pace
+    # what other programs do now, and not what they did then
+    cores = os.cpu_count() or 1
+    return replace(pace, busy=1.0 + os.getloadavg()[0] / cores)

@@ -110,7 +110,7 @@ def planned(
         tiles = strips_of(region, strips) if strips else tiles_of(region, bytes_a_pixel, budget)
         seconds, pace = None, on.pace or (given.pace if given else None)
         if pace:
-            tracing = region.pixels * samples_of(scene) * len(plan) * pace.path
+            tracing = region.pixels * samples_of(scene) * len(plan) * pace.path * pace.busy
             # with other planes for each render of a tile, each is prepared for
             once = on.is_kept and len(plan) == 1
             ready = pace.again if once else len(plan) * pace.ready

@@ -82,15 +82,17 @@ class _Laps:
         paths = picture_region(on.scene).pixels * on.scene.cycles.samples
         tracing, worked = (b - a for a, b in zip(self.traced, self.written, strict=True))
         ready, before = self.traced[0] - self.begun[0], on.pace
-        busy = 1.0
-        if on.scene.cycles.device == "CPU" and worked > 0:
-            busy = tracing * threads(on.scene) / worked
-        return Pace(
+        ready, again = (
             max(ready, before.ready if before else 0.0),
             min(ready, before.again if before else ready),
-            tracing / paths,
-            max(busy, 1.0),
         )
+        if on.scene.cycles.device != "CPU" or worked <= 0:
+            return Pace(ready, again, tracing / paths, 1.0)
+        # other programs come and go: all renders together tell best how busy they keep the machine
+        on.traced = tuple(a + b for a, b in zip(on.traced, (tracing, worked), strict=True))
+        seconds, work = on.traced
+        busy = max(seconds * threads(on.scene) / work, 1.0)
+        return Pace(ready, again, worked / threads(on.scene) / paths, busy)
 
 
 def _now() -> tuple[float, float]:

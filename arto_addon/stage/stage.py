@@ -29,8 +29,8 @@ class Pace:
     """How fast a stage renders.
 
     ready: seconds until the first path, where Cycles has to prepare the scene; again: the same
-    where Cycles kept the scene; path: seconds for a path; busy: how many times longer that takes
-    than on a machine that does nothing else.
+    where Cycles kept the scene; path: seconds for a path on a machine that does nothing else; busy:
+    how many times longer that takes on this machine.
     """
 
     ready: float
@@ -53,6 +53,8 @@ class Stage:
         self.portals: bool | None = None
         self.own_groups: list[str] = []  # The artist's light groups that have objects.
         self._made: list[bpy.types.ID] = []
+        # Seconds in which small renders traced paths, and seconds of all threads.
+        self.traced: tuple[float, ...] = (0.0, 0.0)
         self.scene_bytes = 0  # What Cycles says that the scene takes which it has prepared.
         self._longest = 0  # The most samples that the scene which Cycles keeps was rendered with.
 

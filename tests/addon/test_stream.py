@@ -175,7 +175,7 @@ def test_the_estimate_is_of_what_comes(tmp_path, monkeypatch):
         # work is kept every minute, so many samples are more renders; each is of 6 patches under 5
         # patterns and the grain
         assert found.renders == 3 if samples == 4 else found.renders > 3
-        tracing, images = 144 * 108 * samples * 1e-5, 144 * 108 * 36
+        tracing, images = 144 * 108 * samples * 3e-5, 144 * 108 * 36
         each = 3.0 * (room.SAVING + room.FITTING / (os.cpu_count() or 1))
         # the scene is prepared once for all renders
         expected = 2.0 + found.renders * 0.5 + tracing + images * each
