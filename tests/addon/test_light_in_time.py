@@ -56,6 +56,7 @@ def moving(shot):
     scene.frame_set(1)
 
 
+@pytest.mark.newest
 @pytest.mark.parametrize("denoised", [False, True])
 def test_a_keyed_strength_is_the_light_times_it(moving, denoised) -> None:
     if denoised and not denoise.available():
@@ -72,6 +73,7 @@ def test_a_keyed_strength_is_the_light_times_it(moving, denoised) -> None:
         assert off < (0.002 if denoised else 1e-4)
 
 
+@pytest.mark.newest
 def test_a_keyed_turn_has_no_flicker_of_its_own(moving) -> None:
     """What neighbours differ by changes slowly: the second difference is small beside the first."""
     hdri(moving, smooth(32))
@@ -83,6 +85,7 @@ def test_a_keyed_turn_has_no_flicker_of_its_own(moving) -> None:
     assert second < 0.25 * first
 
 
+@pytest.mark.newest
 def test_a_keyed_light_of_the_kit_adds_as_its_key_says(moving) -> None:
     kits.write(
         moving.world,
@@ -100,6 +103,7 @@ def test_a_keyed_light_of_the_kit_adds_as_its_key_says(moving) -> None:
     assert np.isclose(steps, steps[:1], atol=2e-4).mean() > 0.99
 
 
+@pytest.mark.newest
 def test_live_says_whose_light_it_shows_while_the_timeline_plays() -> None:
     was = 3, 0.0, "Camera", 24, 18
     said = other_shot(was, (7, 0.5, *was[2:]))

@@ -182,6 +182,7 @@ def test_what_a_sun_could_bring_out_is_kept(seed: int) -> None:
     assert (small > 0).all() and (small <= DROPPED * size.sum(axis=0)).all()
 
 
+@pytest.mark.newest
 @pytest.mark.parametrize("patterns", ["paper", "linear", "moments_uv"])
 @pytest.mark.parametrize("shape", [(1, 1), (1, 5), (5, 8)])
 def test_what_is_dropped_of_a_tile_stays_under_its_share(

@@ -87,6 +87,7 @@ def test_a_hidden_light_comes_back(field: Field, answers: Answers) -> None:
     assert np.abs(got - true).mean() < 0.1 * true.mean()
 
 
+@pytest.mark.newest
 def test_near_keeps_the_present_light(field: Field, answers: Answers) -> None:
     hidden, start = sky(1), sky(2)
     target = asked(answers, shown(field, hidden))
@@ -101,6 +102,7 @@ def test_near_keeps_the_present_light(field: Field, answers: Answers) -> None:
     assert apart[2] < 0.02 * float(np.abs(want - have).mean())
 
 
+@pytest.mark.newest
 @pytest.mark.parametrize("balance", [False, True])
 def test_a_cast_is_light_or_white_balance(field: Field, answers: Answers, balance: bool) -> None:
     light, cast = sky(1), np.array([1.5, 1.0, 0.6])
@@ -222,6 +224,7 @@ def test_a_region_is_made_even(answers: Answers) -> None:
     assert ask.unevenness(after, albedo, region) < 0.5 * before
 
 
+@pytest.mark.newest
 def test_what_is_kept_stays(answers: Answers) -> None:
     light = sky(1)
     n = len(answers.alpha)
