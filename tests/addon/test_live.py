@@ -335,27 +335,6 @@ def test_a_packed_hdri_is_sent_once_for_each_change(scene, monkeypatch) -> None:
     assert (len(bpy.data.worlds), len(bpy.data.images)) == (worlds, images)
 
 
-def test_the_world_behind_and_a_render_region(tmp_path) -> None:
-    """An even world is behind the things as it is behind the plate's, in the region alone."""
-    scene = small_scene(tmp_path)
-    scene.arto.keep, scene.arto.support, scene.arto.samples = "never", "auto", 8
-    scene.arto.grain, scene.arto.patterns, scene.arto.live_finish = False, "linear", False
-    scene.camera.data.lens /= 2
-    scene.render.use_border = True
-    scene.render.border_min_x, scene.render.border_max_y = 0.25, 0.9
-    set_colour(scene, (0.5, 0.4, 0.3), 2.0)
-    work.run(shoot.shoot(scene))
-    plate = next(iter(exr.read(relit_file(scene)).values()))
-    assert (plate[..., 3] == 0).any() and (plate[1:4, 12:, 3] == 1).any()
-    on = live.Live(scene)
-    try:
-        seen = _rest(on)
-    finally:
-        on.close()
-        put_away(on.name)
-    assert np.abs(seen - plate).max() < 1e-3 * plate[..., :3].mean()
-
-
 def test_another_film_while_it_is_on(scene, on) -> None:
     """The world behind comes and goes with the film; a film that the shot's Ray Portals were not
     captured for is said, and nothing wrong is shown meanwhile."""
@@ -454,3 +433,24 @@ def test_an_image_of_the_artists_only_gives_its_name(scene, name) -> None:
     painted.pixels.foreach_get(found)
     np.testing.assert_allclose(found, 0.25, atol=1 / 255)
     bpy.data.images.remove(painted)
+
+
+def test_the_world_behind_and_a_render_region(tmp_path) -> None:
+    """An even world is behind the things as it is behind the plate's, in the region alone."""
+    scene = small_scene(tmp_path)
+    scene.arto.keep, scene.arto.support, scene.arto.samples = "never", "auto", 8
+    scene.arto.grain, scene.arto.patterns, scene.arto.live_finish = False, "linear", False
+    scene.camera.data.lens /= 2
+    scene.render.use_border = True
+    scene.render.border_min_x, scene.render.border_max_y = 0.25, 0.9
+    set_colour(scene, (0.5, 0.4, 0.3), 2.0)
+    work.run(shoot.shoot(scene))
+    plate = next(iter(exr.read(relit_file(scene)).values()))
+    assert (plate[..., 3] == 0).any() and (plate[1:4, 12:, 3] == 1).any()
+    on = live.Live(scene)
+    try:
+        seen = _rest(on)
+    finally:
+        on.close()
+        put_away(on.name)
+    assert np.abs(seen - plate).max() < 1e-3 * plate[..., :3].mean()
