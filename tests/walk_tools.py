@@ -118,11 +118,11 @@ class Walk:
         ]
         subprocess.run(line, env={**os.environ, "DISPLAY": self.w.display}, check=True)
 
-    def press(self, button: str, until: str) -> None:
+    def press(self, button: str, until: str, across: float = 0.45, start: int = 5) -> None:
         """Click a button of the sidebar until it has done what it does: where software draws the
         window, one that is being drawn anew may miss a click."""
         for _ in range(4):
-            self.w.click(*self.w.button(button))
+            self.w.click(*self.w.button(button, across, start))
             self.clicks += 1
             end = time.monotonic() + 10
             while time.monotonic() < end:
