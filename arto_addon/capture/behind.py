@@ -23,6 +23,7 @@ from ...core.hemicube import Hemicube
 from ..blender.markers import camera_of
 from ..blender.nodes import Input, Nodes
 from ..blender.reached import reached
+from ..blender.version import FIVE
 from ..stage.bounds import Rendered
 from ..stage.stage import Stage
 
@@ -52,8 +53,11 @@ def see_behind(on: Stage) -> None:
 def passes(on: Stage) -> int | None:
     """How many transparent surfaces the artist's render lets a path pass; None if not prepared."""
     found = on.changed.get("cycles.transparent_max_bounces", [None])[0]
-    # Cycles ends a path after the surface at which it counts this many, and so after one at least
-    return max(found, 1) if isinstance(found, int) else None
+    if not isinstance(found, int):
+        return None
+    # Blender 5 ends a path after the surface at which it counts this many, and so after one at
+    # least; 4.5 lets it pass that one
+    return max(found, 1) if FIVE else found + 1
 
 
 def portals_seen(on: Stage, seen: Rendered) -> bool | None:

@@ -266,7 +266,7 @@ def test_two_worlds_of_one_name_are_refused_before_work(tmp_path):
     exr.write(tmp_path / "layers.exr", some)
     for name, match in (
         ("none.exr", "no environment map"),
-        ("cut.exr", "damaged or cut off"),
+        ("cut.exr", "truncated or damaged"),
         ("text.hdr", "damaged or cut off"),
         ("layers.exr", "an EXR of layers"),
     ):
