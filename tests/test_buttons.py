@@ -175,6 +175,7 @@ scene.arto.live_finish, scene.arto.compare = True, "OFF"
 """
 
 
+@pytest.mark.skipif("ARTO_LONG" not in os.environ, reason="ARTO_LONG: a minute of buttons more")
 def test_what_the_buttons_do_with_a_shot(walk: Walk) -> None:
     w = walk.w
     w.do(STATE)

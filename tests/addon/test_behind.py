@@ -215,4 +215,4 @@ def test_leaves_behind_each_other_end_where_a_render_ends_them(tmp_path):
         for rows in (slice(0, 5), slice(8, 18)):
             mine, right = picture[rows, columns, :3].mean(), truth[rows, columns].mean()
             # in 4.5 shadow rays and other paths end at other surfaces: no one limit has both
-            assert abs(mine / right - 1) < (0.02 if FIVE else 0.04), (columns, rows, mine / right)
+            assert abs(mine / right - 1) < (0.02 if FIVE else 0.06), (columns, rows, mine / right)
