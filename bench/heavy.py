@@ -6,10 +6,7 @@ then timed. How often Cycles prepared the scene is counted from what Cycles says
 
 from __future__ import annotations
 
-import json
-import os
 import re
-import subprocess
 import sys
 import tempfile
 import time
@@ -19,10 +16,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from .apart import rows_of, tell
 from .machine import write_rows
 
-ROOT = Path(__file__).resolve().parent.parent
-MARK = "ARTO rows: "
 Row = dict[str, Any]
 
 
@@ -202,24 +198,17 @@ def child(stage: str, name: str, size: dict[str, Any], folder: str) -> None:
     registered()
     _settings(scene, of, Path(folder))
     bpy.ops.wm.save_as_mainfile(filepath=str(Path(folder) / "scene.blend"))
-    print(MARK + json.dumps(STAGES[stage](bpy.context.scene, of, Path(folder))), flush=True)
+    tell(STAGES[stage](bpy.context.scene, of, Path(folder)))
 
 
 def _run(stage: str, name: str, size: Size) -> list[Row]:
     """The rows of a stage, run in a process of its own."""
-    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile("w+") as out:
+    with tempfile.TemporaryDirectory() as folder:
         text = f"from bench.heavy import child; child({stage!r}, {name!r}, {asdict(size)!r}, "
         line = [sys.executable, "-c", f"{text}{folder!r})"]
-        process = subprocess.Popen(line, cwd=ROOT, stdout=out, stderr=subprocess.STDOUT, text=True)
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-        out.seek(0)
-        said = out.read()
-    if process.returncode:
-        raise RuntimeError(f"the stage {stage} of '{name}' failed:\n{said[-3000:]}")
-    (rows,) = (json.loads(t[len(MARK) :]) for t in said.splitlines() if t.startswith(MARK))
+        rows, peak = rows_of(line, f"{stage} of '{name}'")
     about = {"scene": name, "width": size.width, "height": size.height, "samples": size.samples}
-    return [about | row | {"peak_bytes": usage.ru_maxrss * 1024} for row in rows]
+    return [about | row | {"peak_bytes": peak} for row in rows]
 
 
 def heavy(

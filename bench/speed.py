@@ -6,21 +6,19 @@ Python: that of the module, or once that of the real program, whose numpy is ano
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import shlex
-import subprocess
 import sys
 import tempfile
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from .apart import ROOT, rows_of, tell
 from .machine import write_rows
 from .speed_stages import PATCHES, STAGES, Row, Size
 
-ROOT = Path(__file__).resolve().parent.parent
 LIMITS = {
     "capture and fit": "a plain render of the same samples",
     "fit": "reading its images",
@@ -46,13 +44,11 @@ for name, folder in (("arto", root), ("bench", root / "bench")):
 from bench import speed
 speed.child({name!r}, {size!r}, {folder!r})
 """
-MARK = "ARTO rows: "
 
 
 def child(name: str, size: dict[str, Any], folder: str) -> None:
     """Run a stage here, and print its rows as a line of JSON."""
-    rows = STAGES[name](Size(**size), Path(folder))
-    print(MARK + json.dumps(rows), flush=True)
+    tell(STAGES[name](Size(**size), Path(folder)))
 
 
 def _run(name: str, size: Size, folder: Path, program: str = "") -> list[Row]:
@@ -64,19 +60,11 @@ def _run(name: str, size: Size, folder: Path, program: str = "") -> list[Row]:
     else:
         text = f"from bench.speed import child; child({name!r}, {asdict(size)!r}, {str(folder)!r})"
         line = [sys.executable, "-c", text]
-    with tempfile.TemporaryFile("w+") as out:
-        process = subprocess.Popen(line, cwd=ROOT, stdout=out, stderr=subprocess.STDOUT, text=True)
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-        out.seek(0)
-        said = out.read()
-    if process.returncode:
-        raise RuntimeError(f"the stage {name} at {size} failed:\n{said[-3000:]}")
-    (rows,) = (json.loads(t[len(MARK) :]) for t in said.splitlines() if t.startswith(MARK))
+    rows, peak = rows_of(line, f"{name} at {size}")
     where = "program" if program else "module"
     about = {"width": size.width, "height": size.height, "samples": size.samples, "where": where}
     # of the process: the program's may be of what sets it up
-    about["peak_bytes"] = usage.ru_maxrss * 1024
+    about["peak_bytes"] = peak
     return [about | row for row in rows]
 
 

@@ -11,20 +11,17 @@ import bpy
 import numpy as np
 import pytest
 from arto.arto_addon import shoot, work
-from arto.arto_addon.blender import pictures
 from arto.arto_addon.fit import fit
 from arto.arto_addon.live import live, maps, sent
 from arto.arto_addon.live.image import IMAGE, put_away
 from arto.arto_addon.live.viewer import Viewer, Wish
-from arto.arto_addon.plate import compare
 from arto.arto_addon.plate.names import relit_file
-from arto.arto_addon.relight.light_key import HEADER, light_key
 from arto.arto_addon.relight.relight import compute
 from arto.arto_addon.shot import paths, pixels
 from arto.arto_addon.world import kept
 from arto.arto_addon.world.dials import without_dials
 from arto.core import exr
-from arto.core.errors import ArtoError, SceneError
+from arto.core.errors import SceneError
 from scene_tools import captured, set_colour, small_scene
 
 
@@ -377,62 +374,6 @@ def test_a_linked_world(tmp_path) -> None:
     finally:
         made.close()
     assert len(bpy.data.worlds) == worlds
-
-
-def test_without_a_capture_it_says_so(tmp_path) -> None:
-    scene = small_scene(tmp_path)
-    with pytest.raises(ArtoError, match="no reflectance field"):
-        live.Live(scene)
-
-
-def test_one_button(tmp_path) -> None:
-    """Capture, fit and relight in one: the plate is that of the three by themselves, the shares of
-    the work only rise, and its key says that it is of this light."""
-    scene = small_scene(tmp_path)
-    scene.arto.keep, scene.arto.support, scene.arto.samples = "never", "auto", 16
-    scene.arto.grain, scene.arto.patterns = False, "linear"
-    set_colour(scene, (0.5, 0.4, 0.3))
-    shares = []
-    path = work.run(shoot.shoot(scene), lambda step: shares.append(step.share))
-    assert path == relit_file(scene) and path.is_file()
-    assert shares == sorted(shares) and shares[-1] == 1.0
-    assert exr.header(path)[HEADER] == light_key(scene, scene.world)
-    one = next(iter(exr.read(path).values()))
-    work.run(compute(scene, scene.view_layers[0].name))
-    np.testing.assert_array_equal(next(iter(exr.read(path).values())), one)
-    scene.world.arto.strength = 2.0
-    assert exr.header(path)[HEADER] != light_key(scene, scene.world)
-
-
-def test_one_button_without_a_world(tmp_path) -> None:
-    scene = small_scene(tmp_path)
-    scene.arto.samples, scene.world = 4, None
-    texts = []
-    assert work.run(shoot.shoot(scene), lambda s: texts.append(s.text)) is None
-    assert "add a world" in texts[-1]
-    assert (paths.field_folder(scene) / "field.json").is_file()
-
-
-@pytest.mark.parametrize("name", [IMAGE, compare.IMAGE])
-def test_an_image_of_the_artists_only_gives_its_name(scene, name) -> None:
-    """What is shown takes the name, and what goes with the window is ours alone."""
-    painted = bpy.data.images.new(name, 4, 2)
-    painted.pixels.foreach_set(np.full(32, 0.25, np.float32))
-    shown = pictures.put(name, np.ones((2, 3, 4), np.float32))
-    assert shown != painted and shown.name == name
-    assert pictures.put(name, np.zeros((2, 3, 4), np.float32)) == shown
-    put_away("no plate", compare.IMAGE)
-    compare.forget()
-    assert name not in bpy.data.images
-    # nor does what only has the name go
-    painted.name = name
-    put_away("no plate", compare.IMAGE)
-    compare.forget()
-    assert bpy.data.images[name] == painted
-    found = np.empty(32, np.float32)
-    painted.pixels.foreach_get(found)
-    np.testing.assert_allclose(found, 0.25, atol=1 / 255)
-    bpy.data.images.remove(painted)
 
 
 def test_the_world_behind_and_a_render_region(tmp_path) -> None:
