@@ -57,8 +57,8 @@ def asked(scene: bpy.types.Scene, shape: tuple[int, int]) -> Asked:
     fit = fitting(picture, shape)
     if fit.shape[-1] == 4:
         # where the target is empty it says nothing
-        mask = mask * np.clip(fit[..., 3], 0, 1)
-    good = np.isfinite(fit[..., :3]).all(axis=-1)
+        mask = mask * np.clip(np.nan_to_num(fit[..., 3], nan=0.0), 0, 1)
+    good = np.isfinite(fit).all(axis=-1)
     return Asked(np.where(good[..., None], fit[..., :3], 0), mask * good, keep, words)
 
 
@@ -87,8 +87,12 @@ def masks(
 
 
 def _grey(image: bpy.types.Image, shape: tuple[int, int]) -> NDArray[np.float64]:
-    """A mask's brightness times its alpha, at the size of the shot."""
+    """A mask's brightness times its alpha, at the size of the shot. Raises TargetError."""
     raw = _raw(image)
+    if not np.isfinite(raw).all():
+        raise TargetError(
+            f"the mask '{image.name}' has pixels that are infinite or not a number: paint it anew"
+        )
     return np.clip(fitting(raw[..., :3].mean(axis=-1) * raw[..., 3], shape), 0, 1)
 
 

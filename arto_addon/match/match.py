@@ -32,7 +32,7 @@ from ..work import Progress, Steps, Warned, Wrote
 from ..world import kept
 from ..world.check import check_world
 from .asked import asked, masks, named_in
-from .found import Found, write
+from .found import Found, match_file, write
 from .lights import BASE, WORLD, lights_of, own_parts
 
 Change = Literal["LIGHT", "GAINS", "TURN"]
@@ -126,16 +126,17 @@ def _matched(
     balance = settings.match_balance and asked_scale
     change: Change = settings.match_change
     yield Progress(0.2, "working out the lights")
+    check_beside(scene, match_file(plate), plate, named_in(scene))
     world_path = ""
     if change == "LIGHT":
+        lit = world_file(relit_file(scene, look))
+        check_beside(scene, lit, relit_file(scene, look), named_in(scene))
         present = kept.environment(scene, settings.environment_width, layer, world)
         own = sum(own_parts(scene, answers).values(), np.zeros_like(target.picture))
         done = yield from _steps(
             free_light(answers, present, target, own, settings.match_near, exposure, balance)
         )
         assert done.environment is not None
-        lit = world_file(relit_file(scene, look))
-        check_beside(scene, lit, relit_file(scene, look), named_in(scene))
         about = {PLATE: relit_file(scene, look).name}
         exr.write(lit, {"": done.environment.image}, about, working_space())
         yield Wrote(0.95, f"wrote {lit}", lit)

@@ -96,7 +96,8 @@ def write(path: Path, mix: Mix, opener: Opener) -> Iterator[Progress]:
     """Write the scripts of a mix beside a plate; one that was changed stays."""
     for ending, text in _WRITERS.items():
         script = path.with_suffix(ending)
-        if script.exists() and script.stat().st_size and not is_own_script(script):
+        empty = script.is_file() and not script.stat().st_size
+        if script.exists() and not empty and not is_own_script(script):
             yield Progress(0.95, f"{script.name} was changed since, or is not ARTO's: it stays")
             continue
         with opener(script) as partial:

@@ -158,6 +158,8 @@ def _match(
     for name, path in images.items():
         if path is None:
             continue
+        if not path.is_file():
+            raise OptionError(f"there is no file {path}: choose another mask")
         try:
             image = bpy.data.images.load(str(path.resolve()), check_existing=True)
         except RuntimeError as e:

@@ -45,6 +45,8 @@ class Blend(StrEnum):
     MULTIPLY = "MULTIPLY"
 
 
+# The longest name of a light, in bytes: Blender cuts off the label of a node after it.
+LONGEST = 63
 # name of a number -> (its least, its largest)
 BOUNDS: dict[str, tuple[float, float]] = {
     "azimuth": (-1e6, 1e6),
@@ -90,6 +92,21 @@ def check(of: object, what: str) -> None:
             len(value) != 3 or not all(is_finite(x) and 0 <= x <= 1e9 for x in value)
         ):
             raise KitError(f"{what}: '{field.name}' is three numbers from 0 on, not {value}")
+        elif str(field.type) == "str":
+            _check_text(value, field.name, what)
+
+
+def _check_text(text: str, name: str, what: str) -> None:
+    """Raise KitError for a text that no file can hold, or a name that Blender would cut off."""
+    try:
+        size = len(text.encode())
+    except UnicodeEncodeError:
+        size = -1
+    if size < 0 or "\0" in text or (name == "name" and size > LONGEST):
+        raise KitError(
+            f"{what}: '{name}' is a text of UTF-8 without zeros"
+            + (f", of at most {LONGEST} bytes" if name == "name" else "")
+        )
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ class Target:
     Raises
     ------
     TargetError
-        No pixel counts, or one that counts is infinite or not a number.
+        No pixel counts, one that counts is infinite or not a number, or all of them are black.
     """
 
     picture: NDArray[np.float64]
@@ -50,6 +50,12 @@ class Target:
             raise TargetError(
                 "the target has pixels that are infinite or not a number: mask them out, or render "
                 "it again"
+            )
+
+        if not (self.picture[self.weights > 0] > 0).any():
+            raise TargetError(
+                "the target is black where it is to be matched, which is no light: choose another "
+                "target or mask"
             )
 
     @property

@@ -62,7 +62,7 @@ class _Script:
             if layer.file is None:
                 channels = " ".join(f"{layer.name}.{c}" for c in ("red", "green", "blue"))
                 self._lines.append(f"add_layer {{{layer.name} {channels}}}")
-        note = _escaped("\n".join(words(mix))).replace("\n", "\\n")
+        note = _escaped("\n".join(words(mix)[1:])).replace("\n", "\\n")
         self._node("StickyNote", "Note", (), (0, -240), [("label", f'"{note}"')])
         self._read("Plate", mix.plate, (-200, 0))
         if mix.together is not None:

@@ -3,6 +3,7 @@ and the comp on footage."""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import bpy
@@ -12,8 +13,10 @@ import pytest
 from arto.arto_addon import work
 from arto.arto_addon.blender.compositing import compositor
 from arto.arto_addon.plate import plate
-from arto.arto_addon.relight import relight
+from arto.arto_addon.relight import relight, scripts
 from arto.core import exr
+from arto.core.files import whole
+from arto.core.mix.mix import Layer, Mix
 from scene_tools import captured
 from shot_tools import with_catcher
 
@@ -93,3 +96,12 @@ def test_a_script_makes_the_comp_on_footage(tmp_path, shadows):
         script = path.with_suffix(ending).read_text("utf-8")
         found = mix_tools.rgb(run(script, files, str(path.parent))["Composite"])
         np.testing.assert_allclose(found, comp[..., :3], atol=2e-5 * comp.max())
+
+
+def test_what_is_no_file_stays_too(tmp_path):
+    mix = Mix("a.exr", (4, 2), (Layer("key"),), together="a_layers.exr")
+    os.mkfifo(tmp_path / "a.comp")
+    (tmp_path / "a.nk").touch()
+    said = [step.text for step in scripts.write(tmp_path / "a.exr", mix, whole)]
+    assert len(said) == 1 and "a.comp" in said[0] and (tmp_path / "a.comp").is_fifo()
+    assert (tmp_path / "a.nk").read_text("utf-8").count("ARTO mix 0000") == 0

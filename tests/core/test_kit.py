@@ -103,6 +103,10 @@ def test_a_kit_comes_back_from_its_file(tmp_path: Path) -> None:
         {"turn": math.inf},
         {"arto kit": 99},
         {"strenght": 1},
+        {"lights": [{"name": "a\ud800b"}]},
+        {"lights": [{"name": "a\0b"}]},
+        {"lights": [{"name": "a" * 64}]},
+        {"lights": [{"name": "a", "image": "/\udc80.png"}]},
     ],
 )
 def test_a_wrong_kit_is_refused(wrong: dict, tmp_path: Path) -> None:

@@ -283,3 +283,11 @@ def test_a_target_of_another_size_is_brought_or_refused() -> None:
         Target(np.ones((4, 3)), np.zeros(4))
     with pytest.raises(TargetError, match="not a number"):
         Target(np.full((4, 3), np.nan), np.ones(4))
+
+
+def test_a_black_target_is_refused() -> None:
+    """Before work: every light is infinitely far off from none."""
+    with pytest.raises(TargetError, match="black"):
+        Target(
+            np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [1.0, 1.0, 1.0]]), np.array([1.0, 1, 0])
+        )
