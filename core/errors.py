@@ -74,6 +74,10 @@ class StrictError(ArtoError):
     """A warning that counts as an error, because the caller asked for that."""
 
 
+class PhotographsError(ArtoError):
+    """Photographs that cannot become a shot: one is missing, of another size, or cannot be read."""
+
+
 class FarmError(ArtoError):
     """A farm's job that is incomplete or damaged, or that was made for another scene."""
 

@@ -96,7 +96,7 @@ FLOW = {
     < files < places < arrays < signed < region < file_names < description < values < shot
     < metrics < patterns < measure < faces < partition < hemicube < mix < exr < cryptomatte
     < capture < light < kit < supports < field < fit < lights < relight < catcher < preview
-    < inside < place < match < verify""",
+    < inside < place < match < verify < photographs""",
     "arto_addon": """interrupt < work < settings < blender < stage < shot < kit < world < plate
     < fit < capture < relight < match < shoot < job < live < farm < ui""",
 }
