@@ -25,11 +25,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .dome import APART, Dome
 from .errors import HemicubeError
 from .faces import FACE_NAMES, FACES, FINEST, LEAF_SIDES, Leaf
 from .measure import Extent, uniform_moments
 from .partition import Cell, Grid, Quadtree
 
+MOST_LAMPS = 10_000
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -53,6 +55,10 @@ class Hemicube:
         The half-edge in scene units.
     leaves : tuple of Leaf
         Patches of a quadtree in place of the grid. A direction that meets no leaf has no patch.
+    lamps : tuple of 3 float
+        The cells of a dome's lamps in place of the grid: directions of length 1, see `dome`.
+    reach : float
+        Degrees around its direction for which a lamp stands at most.
 
     Raises
     ------
@@ -67,6 +73,8 @@ class Hemicube:
     centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
     size: float = 1000.0
     leaves: tuple[Leaf, ...] = ()
+    lamps: tuple[tuple[float, float, float], ...] = ()
+    reach: float = 180.0
 
     def __post_init__(self) -> None:
         if not self.faces or len(set(self.faces)) != len(self.faces):
@@ -84,6 +92,8 @@ class Hemicube:
                 raise HemicubeError(f"no patch {row},{column} of {n}x{n} on the face '{face}'")
         if isinstance(self.partition, Quadtree) and self.partition.overlap:
             raise HemicubeError("the patches of the hemicube overlap")
+        if self.lamps:
+            self._check_lamps()
         if not (math.isfinite(self.size) and self.size > 0):
             raise HemicubeError(f"a hemicube of size {self.size}: choose a size above 0")
         r = np.array(self.orientation, np.float64)
@@ -94,6 +104,18 @@ class Hemicube:
         ):
             raise HemicubeError("the orientation of the hemicube must be a rotation")
 
+    def _check_lamps(self) -> None:
+        d = np.array(self.lamps, np.float64)
+        if d.ndim != 2 or d.shape[1] != 3 or not np.allclose((d * d).sum(1), 1, atol=1e-6):
+            raise HemicubeError("the direction of a lamp is three numbers, of length 1")
+        if self.leaves or len(self.faces) < len(FACES) or not 0 < self.reach <= 180:
+            raise HemicubeError("lamps stand on all faces, without leaves, and reach 0 to 180")
+        cosines = d @ d.T
+        np.fill_diagonal(cosines, -1)
+        if (cosines > math.cos(math.radians(APART))).any():
+            a, b = np.unravel_index(int(cosines.argmax()), cosines.shape)
+            raise HemicubeError(f"the lamps {a} and {b} have one direction: take one of them")
+
     def to_json(self) -> dict[str, Any]:
         """Give the hemicube as an object of a description.
 
@@ -101,7 +123,10 @@ class Hemicube:
         -------
         dict
         """
-        return asdict(self)
+        out = asdict(self)
+        if not self.lamps:  # as files were before there were lamps
+            del out["lamps"], out["reach"]
+        return out
 
     @staticmethod
     def from_json(data: dict[str, Any]) -> Hemicube:
@@ -134,6 +159,9 @@ class Hemicube:
             if not isinstance(half, bool):
                 raise TypeError(f"half_sides is {half!r:.40}")
             x, y, z = (float(number(x)) for x in data["centre"])
+            lamps = data.get("lamps") or ()
+            if len(lamps) > MOST_LAMPS:
+                raise ValueError(f"{len(lamps)} lamps")
             return Hemicube(
                 faces=tuple(str(f) for f in data["faces"][: len(FACES) + 1]),
                 patches=number(data["patches"], (int,)),
@@ -144,13 +172,19 @@ class Hemicube:
                 centre=(x, y, z),
                 size=float(number(data["size"])),
                 leaves=tuple((str(f), *(number(n, (int,)) for n in rest)) for f, *rest in leaves),
+                lamps=tuple(
+                    (float(number(a)), float(number(b)), float(number(c))) for a, b, c in lamps
+                ),
+                reach=float(number(data.get("reach", 180.0))),
             )
         except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as e:
             raise HemicubeError(f"this is not the description of a hemicube: {e!r:.200}") from None
 
     @cached_property
-    def partition(self) -> Grid | Quadtree:
+    def partition(self) -> Grid | Quadtree | Dome:
         """How the faces are cut into patches."""
+        if self.lamps:
+            return Dome(self.lamps, self.reach)
         if self.leaves:
             return Quadtree(self.faces, self.leaves)
         return Grid(self.faces, self.patches, self.half_sides)
@@ -190,6 +224,8 @@ class Hemicube:
         str
         """
         face, row, column = self.grid[k]
+        if self.lamps:
+            return f"lamp {k} ({face})"
         return f"{face} {row},{column}" + (f" of {self.leaves[k][1]}" if self.leaves else "")
 
     @cached_property
@@ -216,6 +252,12 @@ class Hemicube:
         """
         return np.array(FACES[face], np.float64) @ np.array(self.orientation).T
 
+    def _frame_of(self, k: int) -> NDArray[np.float64]:
+        """The frame of the face that a patch is on; a lamp's cell has its own."""
+        if isinstance(self.partition, Dome):
+            return self.partition.frames[k] @ np.array(self.orientation).T
+        return self.frame(self.grid[k][0])
+
     def corners(self, k: int) -> NDArray[np.float64]:
         """Compute the corners of a patch.
 
@@ -229,7 +271,7 @@ class Hemicube:
             At (u, v) = (0, 0), (1, 0), (1, 1), (0, 1), relative to the centre, for half-edge 1.
         """
         x0, x1, y0, y1 = self.extents[k]
-        c, eu, ev = self.frame(self.grid[k][0])
+        c, eu, ev = self._frame_of(k)
         return np.array([c + x * eu + y * ev for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))])
 
     def directions(self, k: int, u: NDArray, v: NDArray) -> NDArray[np.float64]:
@@ -247,7 +289,7 @@ class Hemicube:
             Unit vectors.
         """
         x0, x1, y0, y1 = self.extents[k]
-        c, eu, ev = self.frame(self.grid[k][0])
+        c, eu, ev = self._frame_of(k)
         x = np.asarray(x0 + (x1 - x0) * np.asarray(u, np.float64))[..., None]
         y = np.asarray(y0 + (y1 - y0) * np.asarray(v, np.float64))[..., None]
         d = c + x * eu + y * ev
@@ -286,7 +328,10 @@ class Hemicube:
 
     @cached_property
     def solid_angles(self) -> NDArray[np.float64]:
-        """(K,) float64: the steradians of each patch seen from the centre, in closed form."""
+        """(K,) float64: the steradians of each patch seen from the centre, in closed form; those
+        of a dome are measured."""
+        if isinstance(self.partition, Dome):
+            return self.partition.solid_angles
         x0, x1, y0, y1 = self.extents.T
 
         def corner(x: NDArray, y: NDArray) -> NDArray:

@@ -69,6 +69,8 @@ class Samples:
 def default_resolution(hemicube: Hemicube, environment: Environment) -> NDArray[np.intp]:
     """Choose the bins a side of each patch: about one texel of the map each, and at least 4.
 
+    A lamp's cell has one bin: nothing is known of the light within it.
+
     Parameters
     ----------
     hemicube : Hemicube
@@ -78,6 +80,8 @@ def default_resolution(hemicube: Hemicube, environment: Environment) -> NDArray[
     -------
     (K,) int
     """
+    if hemicube.lamps:
+        return np.ones(len(hemicube), np.intp)
     return np.maximum(4, environment.image.shape[1] // (4 * hemicube.sides))
 
 

@@ -70,11 +70,15 @@ class Cells:
 
     @cached_property
     def _resolutions(self) -> NDArray[np.intp]:
+        if self.hemicube.lamps:
+            return self.sides
         return np.maximum(self.sides * BINS, 4)
 
     @cached_property
     def _bins(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """For each bin of all patches its cell, and its solid angle in steradians."""
+        if self.hemicube.lamps:  # one cell and one bin each, of no square
+            return np.arange(self.count), self.hemicube.solid_angles
         of, omega = [], []
         for k, (g, r) in enumerate(
             zip(self.sides.tolist(), self._resolutions.tolist(), strict=True)
@@ -253,6 +257,8 @@ def cells_for(field: Field, most: int = MOST) -> Cells:
     Cells
     """
     hemicube = field.hemicube
+    if hemicube.lamps:
+        return Cells(hemicube, np.ones(len(hemicube), np.intp))
     levels = [2**i for i in range(1, MOST_SIDES.bit_length())]
     looks = np.zeros((len(levels), len(hemicube)))
     for tile in field.tiles:

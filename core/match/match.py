@@ -179,6 +179,8 @@ def _finer(cells: Cells, radiance: NDArray[np.float64]) -> NDArray[np.intp] | No
 
     A lamp is smaller than a cell, and its place decides where its shadows and its images are.
     """
+    if cells.hemicube.lamps:  # nothing is known of the parts of a lamp's cell
+        return None
     light = radiance.sum(axis=-1)
     flux = light * cells.solid_angles
     bright = (flux > LAMP * flux.sum()) & (light > CONTRAST * flux.sum() / (4 * np.pi))

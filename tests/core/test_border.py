@@ -94,7 +94,7 @@ def test_the_house_is_as_the_architecture_says() -> None:
 FLOW = {
     "core": """errors < units < memory < regular < picture_files < checksum < before < marked
     < files < places < arrays < signed < region < file_names < description < values < shot
-    < metrics < patterns < measure < faces < partition < hemicube < mix < exr < cryptomatte
+    < metrics < patterns < measure < faces < partition < dome < hemicube < mix < exr < cryptomatte
     < capture < light < kit < supports < field < fit < lights < relight < catcher < preview
     < inside < place < match < verify < photographs""",
     "arto_addon": """interrupt < work < settings < blender < stage < shot < kit < world < plate
