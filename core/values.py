@@ -186,6 +186,27 @@ class Values(Description):
             raise self.wrong(name, value)
         return value
 
+    def pair(self, name: str) -> tuple[float, float] | None:
+        """Read two finite numbers that are not below 0.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        tuple of 2 float or None
+            None where the description has none.
+        """
+        value = self.data.get(name)
+        if value is None:
+            return None
+        if not isinstance(value, list | tuple) or len(value) != 2:
+            raise self.wrong(name, value)
+        if not all(is_finite(x) and x >= 0 for x in value):
+            raise self.wrong(name, value)
+        return float(value[0]), float(value[1])
+
     def one_of(self, name: str, kinds: type[_Kind]) -> _Kind | None:
         """Read one of the names of an enumeration.
 

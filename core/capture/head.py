@@ -80,6 +80,8 @@ class CaptureHead:
     seconds : that rendering took, so far.
     pair : of a take beside the first, the key of the first.
     behind : whether the images have a layer of what the camera sees of the world behind.
+    noise : of photographs: the variance of a channel of an image without light, and its rise with
+        the light.
     portals : whether the light of the patches has what Ray Portals show; None for none.
     others : what the file says beside that; it is written again.
     """
@@ -118,6 +120,7 @@ class CaptureHead:
     seconds: float | None = None
     pair: str | None = None
     behind: bool | None = None
+    noise: tuple[float, float] | None = None
     others: Mapping[str, Any] = field(default_factory=dict)
 
     @staticmethod
@@ -196,6 +199,7 @@ class CaptureHead:
             seconds=said.real("seconds", 0, LONGEST),
             pair=said.some_text("pair"),
             behind=said.kind("behind", bool),
+            noise=said.pair("noise"),
             others=said.others([*_WRITTEN, *(f.name for f in fields(CaptureHead))]),
         )
         head._check(said)
@@ -301,12 +305,6 @@ class CaptureHead:
 
 
 # What `read` checks and `to_json` writes that is no value of its own.
-# In the order in which files have them.
-_IN_ORDER = (
-    "key", "asked", "samples", "seed", "route", "grain", "adaptive", "far", "blender",
-    "colour_space", "film_transparent", "changed", "catchers", "take", "kept", "choice", "separate",
-    "scene", "file", "view_layer", "shot", "frame", "fingerprint",
-)  # fmt: skip
 _WRITTEN = ("format", "version", "patches", "pattern_polynomials")
 # Values that `to_json` writes in places of their own; the others are written where they are known.
 _APART = {

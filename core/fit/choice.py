@@ -118,6 +118,9 @@ def _smallest(
     spreads = even[[UU, VV]] - even[[U, V]] ** 2
     uncertain = np.sqrt(spreads.sum() / n)
     centred = np.sqrt(np.square(offs).sum(axis=0)) + uncertain < CENTRED
+    if known.noise is not None:
+        # noise of photographs is not of the light: a mean place that it drowns tells nothing
+        centred |= hits < 1
     codes = np.where(centred, WHOLE.code, LINEAR.code).astype(np.uint8)
     variances = np.stack(moments.variance)
     if not np.isfinite(variances).any():

@@ -26,6 +26,8 @@ DROPPED = 1e-3
 # taken to give as much light as a whole even sky (pi). This concerns small patches, on which a sun
 # is a thousand times brighter than the sky.
 SUN = 0.01
+# The variance of a place on a patch that is seen evenly, in patch widths.
+WHOLE_SPREAD = 1 / 12
 # Pixels whose entries are sorted at a time, so that they fit the cache.
 BLOCK = 2048
 # Pixels along the side of the window that an entry's noise is measured in.
@@ -52,6 +54,9 @@ class Evidence:
         Samples a pixel of the capture; None for images without noise, such as photographs.
     grain : callable, optional
         Gives the grain (h, w) of a patch by its number, see `capture.names.GRAIN`.
+    noise : tuple of 2 float, optional
+        Of photographs: the variance that noise gives a mean place, in patch widths, is this in the
+        dark and its rise with the size, over the square of the size.
     """
 
     sizes: NDArray[np.float32]
@@ -61,6 +66,7 @@ class Evidence:
     solid_angles: NDArray
     samples: float | None = None
     grain: Callable[[int], NDArray | None] | None = None
+    noise: tuple[float, float] | None = None
 
     def kept(self, k: int) -> NDArray[np.intp]:
         """Find the pixels in which a patch is kept as an entry.
@@ -128,6 +134,8 @@ class Evidence:
         (m,) float
             Infinite for images without noise.
         """
+        if self.noise is not None:
+            return self._as_noisy(self.sizes[k][pixels])
         if self.samples is None:
             return np.full(pixels.shape, np.inf)
         size = self.sizes[k]
@@ -145,6 +153,14 @@ class Evidence:
         # a few grains may cancel by chance, and a path cannot be more than one sample
         return np.minimum(found, 2 * share + 1)
 
+    def _as_noisy(self, size: NDArray) -> NDArray:
+        """How many light paths over a patch would make the mean place as uncertain as photographs
+        do."""
+        assert self.noise is not None
+        dark, rise = self.noise
+        variance = (dark + rise * size) / np.maximum(np.square(size, dtype=np.float64), 1e-300)
+        return WHOLE_SPREAD / np.maximum(variance, 1e-12)
+
 
 def evidence(
     sizes: NDArray[np.float32],
@@ -152,6 +168,7 @@ def evidence(
     solid_angles: NDArray,
     samples: float | None = None,
     grain: Callable[[int], NDArray | None] | None = None,
+    noise: tuple[float, float] | None = None,
 ) -> Evidence:
     """Collect what is known of a tile.
 
@@ -162,6 +179,7 @@ def evidence(
     solid_angles : (K,) float
     samples : float, optional
     grain : callable, optional
+    noise : tuple of 2 float, optional
         All as in `Evidence`.
 
     Returns
@@ -182,7 +200,7 @@ def evidence(
 
     with ThreadPoolExecutor() as pool:
         list(pool.map(look, range(0, pixels, BLOCK)))
-    return Evidence(sizes, least, total, shape, solid_angles, samples, grain)
+    return Evidence(sizes, least, total, shape, solid_angles, samples, grain, noise)
 
 
 def _window_sum(image: NDArray) -> NDArray:

@@ -54,6 +54,7 @@ def fit_tile(
     choice: str,
     samples: float | None = None,
     separate: bool = False,
+    noise: tuple[float, float] | None = None,
 ) -> Iterator[float | TileWriter]:
     """Fit one tile.
 
@@ -71,6 +72,8 @@ def fit_tile(
         Samples a pixel of the capture, which determine its noise; None for no noise.
     separate : bool
         Whether each channel gets a support of its own.
+    noise : tuple of 2 float, optional
+        Of photographs, see `CaptureHead.noise`.
 
     Yields
     ------
@@ -101,7 +104,12 @@ def fit_tile(
     if around.behind is not None and tells_more(around.behind, around.alpha):
         layers["through"] = around.behind
     writer = TileWriter(data.region, layers)
-    known = evidence(sizes, shape, hemicube.solid_angles, samples, data.grain_of)
+    uncertain, grain = None, data.grain_of
+    if noise is not None:
+        # of the sum over three channels; no camera resolves grains
+        uncertain = 3 * patterns.noise_gain * noise[0], patterns.noise_gain * noise[1]
+        grain = None
+    known = evidence(sizes, shape, hemicube.solid_angles, samples, grain, uncertain)
     brightest = None
     if choice == choices.STAGE_AND_MATTE:
         brightest = sizes.argmax(axis=0)
@@ -182,8 +190,9 @@ def fit_into(
     choices.check(choice, captured.patterns, separate)
     with captured.open(tile) as data:
         for step in fit_tile(
-            data, captured.patterns, captured.hemicube, choice, captured.samples, separate
-        ):
+            data, captured.patterns, captured.hemicube, choice, captured.samples, separate,
+            captured.head.noise,
+        ):  # fmt: skip
             if isinstance(step, TileWriter):
                 folder.mkdir(exist_ok=True)
                 return write_tile(folder, tile, step, captured.hemicube).to_json()
@@ -275,8 +284,9 @@ def fit(
             start = time.perf_counter()
             with captured.open(tile) as data:
                 for step in fit_tile(
-                    data, captured.patterns, captured.hemicube, choice, captured.samples, separate
-                ):
+                    data, captured.patterns, captured.hemicube, choice, captured.samples, separate,
+                    captured.head.noise,
+                ):  # fmt: skip
                     if isinstance(step, TileWriter):
                         writer.add(step)
                     else:

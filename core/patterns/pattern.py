@@ -164,6 +164,16 @@ class PatternSet:
         """For each of `MONOMIALS`, whether its moment can be computed from the basis images."""
         return tuple(self.sees(row) for row in np.eye(6))
 
+    @cached_property
+    def noise_gain(self) -> float:
+        """How far noise of the images, each by itself, is in a mean place on the patch.
+
+        The variance of the mean place is this times the variance of an image (of the sum over its
+        channels), over the square of the coefficient.
+        """
+        one, *places = (float(np.square(self._pseudo_inverse[m]).sum()) for m in (ONE, U, V))
+        return sum(places) / 2 + one / 4
+
     def require(self, wanted: tuple[int, ...], what: str) -> None:
         """Check that the set identifies some moments.
 

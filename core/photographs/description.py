@@ -66,6 +66,8 @@ class Photograph:
         Of kind `grey step`: what the monitor was told to show, 0 to 1.
     side : str, optional
         Of kinds `grey step` and `dark`: the monitor's side, a name of `faces.FACES`.
+    angle : float, optional
+        Of kind `grey step`: degrees between the camera and the line straight ahead of the screen.
     take : int
         Which repetition of one light and one exposure. Two takes tell the noise.
     exposure : float, optional
@@ -81,6 +83,7 @@ class Photograph:
     pattern: int | None = None
     step: float | None = None
     side: str | None = None
+    angle: float | None = None
     take: int = 0
     exposure: float | None = None
     aperture: float | None = None

@@ -228,6 +228,7 @@ def _photograph(said: Values, whole: Values) -> Photograph:
         pattern=said.count("pattern", 0, MOST),
         step=said.real("step", 0, 1),
         side=side,
+        angle=said.real("angle", 0, 89),
         take=said.count("take", 0, MOST) or 0,
         exposure=said.real("exposure", SMALLEST, LARGEST),
         aperture=said.real("aperture", SMALLEST, LARGEST),

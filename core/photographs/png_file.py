@@ -47,7 +47,7 @@ def write(path: Path, pixels: NDArray) -> None:
     lines[:, 1:] = rows.view(np.uint8).reshape(height, -1)
     colour = 2 if pixels.ndim == 3 else 0
     head = struct.pack(">IIBBBBB", width, height, depth, colour, 0, 0, 0)
-    parts = ((b"IHDR", head), (b"IDAT", zlib.compress(lines.tobytes(), 6)), (b"IEND", b""))
+    parts = ((b"IHDR", head), (b"IDAT", zlib.compress(lines.tobytes(), 1)), (b"IEND", b""))
     try:
         with whole(path) as partial, partial.open("wb") as file:
             file.write(b"\x89PNG\r\n\x1a\n")
@@ -56,6 +56,6 @@ def write(path: Path, pixels: NDArray) -> None:
                 file.write(struct.pack(">I", len(data)) + name + data + struct.pack(">I", crc))
     except OSError as e:
         raise FilesError(
-            f"{path} cannot be written ({e}): make room on the disk, or choose a folder that can be "
-            "written"
+            f"{path} cannot be written ({e}): make room on the disk, or choose a folder that can "
+            "be written"
         ) from e

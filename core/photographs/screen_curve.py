@@ -1,8 +1,9 @@
-"""The curve of a monitor: how much light a value shows, as photographs of grey steps tell it (paper 4.2).
+"""The curve of a monitor: how much light a value shows, by photographs of grey steps (paper 4.2).
 
-A monitor shows the value x, 0 to 1, at some light. Black is not dark, and the curve is no line. What is lit by a
-pattern is the difference to what is lit by black, so the curve here runs from 0 at black to 1 at white. Monitors are
-also darker from the side: the light at an angle is taken for a power of its cosine.
+A monitor shows the value x, 0 to 1, at some light. Black is not dark, and the curve is no line.
+What is lit by a pattern is the difference to what is lit by black, so the curve here runs from 0 at
+black to 1 at white. Monitors are also darker from the side: the light at an angle is taken for a
+power of its cosine.
 
 Examples
 --------

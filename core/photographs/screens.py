@@ -1,8 +1,8 @@
-"""Screens: where monitors stand around a thing, and which patches of the hemicube they cover (paper 4.1, 4.2).
+"""Screens: where monitors stand around a thing, and which patches they cover (paper 4.1, 4.2).
 
-The hemicube is what a field is made of. A monitor is a rectangle somewhere around the thing. What it shows is decided
-by directions from the thing's middle: a pixel of the screen belongs to the patch that it covers. So a monitor may
-stand as a side of a cube, as in the paper, or anywhere.
+The hemicube is what a field is made of. A monitor is a rectangle somewhere around the thing. What
+it shows is decided by directions from the thing's middle: a pixel of the screen belongs to the
+patch that it covers. So a monitor may stand as a side of a cube, as in the paper, or anywhere.
 
 Coordinates are those of the hemicube: x right, y away from the camera, z up.
 
@@ -35,7 +35,7 @@ COVERED = 0.98
 POINTS = 12
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Screen:
     """One monitor.
 

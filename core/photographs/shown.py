@@ -1,8 +1,9 @@
 """What monitors show, and the photographs to take of it (paper 4.2, 4.3).
 
-A patch shows one pattern after the other while all else is black. A pattern is a polynomial of the patch's
-coordinates, so the picture on the screen is its light turned into values by the monitor's curve. Light that falls off
-with the angle is made up for: what is straight ahead is shown darker, by one factor for all screens.
+A patch shows one pattern after the other while all else is black. A pattern is a polynomial of the
+patch's coordinates, so the picture on the screen is its light turned into values by the monitor's
+curve. Light that falls off with the angle is made up for: what is straight ahead is shown darker,
+by one factor for all screens.
 
 Examples
 --------
@@ -11,12 +12,13 @@ Examples
 >>> picture(screen, cube, 1, "u", monitors)[..., 0].tolist()[-1]  # of the lower right patch
 [0, 0, 0, 0, 99, 163, 206, 240]
 >>> [len(photographs(monitors, cube, exposures=(0.1, 1.0))), level(monitors, cube)]
-[102, 1.0]
+[68, 1.0]
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -61,8 +63,8 @@ def patterns_of(monitors: Monitors) -> PatternSet:
     patterns = pattern_set(monitors.patterns)
     if any(patterns.paths(name) != "all" for name in patterns.patterns):
         raise PhotographsError(
-            f"no monitor can show the patterns '{monitors.patterns}', which tell light paths apart: "
-            "choose 'paper', 'moments_uv' or 'packed'"
+            f"no monitor can show the patterns '{monitors.patterns}', which tell light paths "
+            "apart: choose 'paper', 'moments_uv' or 'packed'"
         )
     return patterns
 
@@ -95,6 +97,12 @@ def level(monitors: Monitors, hemicube: Hemicube, view: str = "ahead") -> float:
     return max(least, 1e-3) ** monitors.falls
 
 
+@lru_cache(maxsize=2)
+def _located(screen: Screen, hemicube: Hemicube) -> tuple[NDArray, NDArray, NDArray]:
+    """The patch, u and v of each pixel of a screen."""
+    return hemicube.locate(screen.places)
+
+
 def emitted(
     screen: Screen,
     hemicube: Hemicube,
@@ -102,8 +110,8 @@ def emitted(
     pattern: str,
     monitors: Monitors,
     whole: float = 1.0,
-) -> NDArray[np.float64]:
-    """Compute the light that each pixel of a screen is to shine for a pattern.
+) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """Compute the light that the pixels of a patch are to shine for a pattern.
 
     Parameters
     ----------
@@ -119,23 +127,21 @@ def emitted(
 
     Returns
     -------
-    (h, w, 3) float64
-        Straight ahead, of white; 0 outside the patch.
+    inside : (h, w) bool
+        The pixels of the patch.
+    light : (n, 3) float64
+        Theirs, straight ahead, as a share of white's.
     """
-    patterns = patterns_of(monitors)
-    places = screen.places
-    patch, u, v = hemicube.locate(places)
+    patch, u, v = _located(screen, hemicube)
     inside = patch == k
-    out = np.zeros((*inside.shape, 3))
-    rows = patterns.emission(pattern)
+    rows = patterns_of(monitors).emission(pattern)
     m = monomials(u[inside], v[inside])
-    # a channel of grains shows white: no camera resolves them
-    shown = [m[0] if row is None else np.tensordot(np.array(row), m, axes=1) for row in rows]
+    # a channel of grains shows their mean: no camera resolves them
+    shown = [m[0] / 2 if row is None else np.tensordot(np.array(row), m, axes=1) for row in rows]
     light = np.stack(shown * (3 // len(shown)), axis=-1)
     if monitors.falls:
-        light *= (whole / screen.cosines(places[inside]) ** monitors.falls)[:, None]
-    out[inside] = np.clip(light, 0, 1)
-    return out
+        light *= (whole / screen.cosines(screen.places[inside]) ** monitors.falls)[:, None]
+    return inside, np.clip(light, 0, 1)
 
 
 def picture(
@@ -158,9 +164,11 @@ def picture(
     (h, w, 3) uint8
         Values, by the monitor's curve; of a monitor that nobody measured, by a power of 2.2.
     """
-    light = emitted(screen, hemicube, k, pattern, monitors, whole)
+    inside, light = emitted(screen, hemicube, k, pattern, monitors, whole)
     curve = assumed_curve() if monitors.curve is None else np.array(monitors.curve)
-    return np.rint(255 * value_of(curve, light)).astype(np.uint8)
+    out = np.zeros((*inside.shape, 3), np.uint8)
+    out[inside] = np.rint(255 * value_of(curve, light)).astype(np.uint8)
+    return out
 
 
 def names_of(monitors: Monitors, hemicube: Hemicube) -> list[tuple[str, int, int, str]]:

@@ -227,6 +227,7 @@ IMPOSSIBLE: dict[str, list[Any]] = {
     "seconds": [-1.0, 1e300, "long", 10**400],
     "pair": ["x" * 40_000, 3],
     "behind": [0, 1, "yes"],
+    "noise": [0.1, [1e-4], [1e-4, -1e-3], [1e-4, "some"], [1e-4, 1e-3, 0.0]],
 }
 OF_NO_KIND = [[[[]]], 7.25, {"a": {"b": []}}]
 NAMED = [f.name for f in fields(CaptureHead) if f.name != "others"]
