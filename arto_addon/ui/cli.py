@@ -34,6 +34,7 @@ from ..relight.relight import relight
 from ..shot import home, paths, scene_id
 from ..shot.adopting import adopt, adopt_from
 from ..work import Batch, ProgressLines, Steps, run, strictly
+from . import cli_photograph
 from .cli_light import give, light
 from .inventory import FORMAT, Inventory, inventory
 from .options import EVERY_FRAME, parser
@@ -107,6 +108,11 @@ def _do(verb: str, options: dict[str, Any], report: Report) -> None:
     scene, layer = _scene(options)
     if verb == "match":
         _match(scene, layer, options, report, batch)
+        return
+    if verb == "photograph":
+        photos = cli_photograph.work_of(scene, layer, options)
+        _set(scene, options)
+        run(_as_asked(photos, batch, False), report)
         return
     source, saves = options.pop("source", None), options.pop("save", False)
     if saves:

@@ -11,6 +11,7 @@ from ...core.file_names import is_text
 from ..blender.devices import KINDS
 from ..settings import table
 from ..settings.setting import Setting
+from . import cli_photograph
 
 # What stands for all frames that a capture was begun of.
 EVERY_FRAME = range(0)
@@ -85,6 +86,12 @@ def parser() -> argparse.ArgumentParser:
                 default=1,
                 help="renders of each, whose light is averaged",
             )
+    cli_photograph.add(
+        jobs.add_parser("photograph", parents=[files, told], help="photograph the scene as a lab"),
+        _path,
+        _from_one,
+        _number,
+    )
     _add_light(jobs.add_parser("light", parents=[files], help="read or write the light kit"))
     _add_adopt(jobs.add_parser("adopt", parents=[files], help="use another file's captures"))
     _add_status(jobs.add_parser("status", parents=[files], help="say what there is of a shot"))
