@@ -21,13 +21,16 @@ from .world.own import sync
 CAPTURED, FITTED = 0.9, 0.95
 
 
-def shoot(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps[Path | None]:
+def shoot(
+    scene: bpy.types.Scene, view_layer: str | None = None, shows: bool = False
+) -> Steps[Path | None]:
     """Capture, fit and relight; returns the path of the plate, None without a world.
 
-    The scene does not change. Raises what the three steps raise; finished steps are kept.
+    shows: whether a window waits for a first picture, see `capture.draft`. The scene does not
+    change. Raises what the three steps raise; finished steps are kept.
     """
     layer = view_layer or layer_of(scene)
-    yield from part_of(capture(scene, layer), 0.0, CAPTURED)
+    yield from part_of(capture(scene, layer, shows=shows), 0.0, CAPTURED)
     yield from part_of(fit(scene, layer), CAPTURED, FITTED - CAPTURED)
     if world_of(scene, layer) is None:
         yield Progress(1.0, "captured: add a world with an HDRI to see the shot in its light")

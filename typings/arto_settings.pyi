@@ -50,6 +50,7 @@ class Settings:
     wipe: float
     footage: Any
     live_finish: bool
+    live_first: bool
     looks: Looks
     active_look: int
     own_groups: Lamps

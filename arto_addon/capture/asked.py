@@ -88,6 +88,19 @@ class Asked:
     catchers: bool
     otherwise: list[bpy.types.Object]
 
+    def named(self, head: CaptureHead) -> CaptureHead:
+        """A head that says what is captured."""
+        return replace(
+            head,
+            key=self.key,
+            scene=self.scene.name,
+            file=home.file(),
+            view_layer=self.view_layer,
+            shot=self.shot,
+            frame=self.scene.frame_current,
+            fingerprint=self.found,
+        )
+
 
 @contextmanager
 def asked(
@@ -197,10 +210,9 @@ def begun(
     if look:
         others = noted(look, this.on.pace or (given.pace if given else None))
     head = replace(
-        this.head,
+        this.named(this.head),
         hemicube=plan.hemicube,
         tiles=tuple(TileEntry(region) for region in plan.tiles),
-        key=this.key,
         patterns=plan.patterns,
         asked=key_of_settings(this.scene),
         route=plan.route,
@@ -210,12 +222,6 @@ def begun(
         kept=plan.kept,
         choice=settings.support,
         separate=settings.separate,
-        scene=this.scene.name,
-        file=home.file(),
-        view_layer=this.view_layer,
-        shot=this.shot,
-        frame=this.scene.frame_current,
-        fingerprint=this.found,
         caution=plan.caution,
         seconds=0.0,
         others=others,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,8 +14,8 @@ import bpy
 from ...core import exr, marked
 from ...core.capture import head as heads
 from ...core.capture.head import CaptureHead
-from ...core.capture.kinds import Route, Take
-from ...core.capture.names import GRAIN, GROUP, group_name
+from ...core.capture.kinds import Take
+from ...core.capture.names import GROUP, group_name
 from ...core.capture.tile_entry import TileEntry, sums_of
 from ...core.errors import ArtoError, CaptureSetError, DeviceMemoryError, ExrError
 from ...core.files import Lock, whole
@@ -25,12 +25,13 @@ from ..fit.guides import cleaned
 from ..shot import paths
 from ..shot.shot import shot_of
 from ..stage import takes
-from ..stage.stage import Stage, set_region
+from ..stage.stage import Stage
 from ..work import Progress, Render, Steps, Warned, Wrote
-from . import beside, planes, room
+from . import beside, draft, room
+from .around import Around, plan_of
 from .asked import Asked, asked, begun
 from .check import check_patterns, check_room_of, check_scene, incomplete_images
-from .plan import ALIGNED, render_plan, strips_of
+from .plan import ALIGNED, strips_of
 from .planned import Given, Planned
 from .resume import empty, empty_take, finish, finish_field, let_go, unfinished
 from .room import Estimate
@@ -56,6 +57,7 @@ def capture(
     view_layer: str,
     given: Given | None = None,
     together: Sequence[int] = (),
+    shows: bool = False,
 ) -> Steps[Path]:
     """Render the basis images of a scene into its capture set; returns the folder.
 
@@ -66,7 +68,8 @@ def capture(
     found by.
 
     given: see `Given`; together: the frames of the sequence that this one is of. A frame of a
-    sequence that is there already, just as it would be captured, is not captured again. Raises
+    sequence that is there already, just as it would be captured, is not captured again. shows:
+    whether a window waits for a first picture, see `draft`. Raises
     SceneError, CaptureSetError, FieldError, PatternError, BusyError (another process captures this
     shot), ExrError, CancelledError.
     """
@@ -77,7 +80,7 @@ def capture(
                 f"a process ended here in the middle of its work ({left}): if nobody stopped it, "
                 "memory is the likely cause; then lower Memory in ARTO's settings",
             )
-        return (yield from _capture(scene, view_layer, place, given, bool(together)))
+        return (yield from _capture(scene, view_layer, place, given, bool(together), shows))
 
 
 def estimate(scene: bpy.types.Scene, view_layer: str) -> Steps[Estimate]:
@@ -112,6 +115,7 @@ def _capture(
     claimed: Path,
     given: Given | None,
     of_sequence: bool,
+    shows: bool,
 ) -> Steps[Path]:
     with asked(scene, view_layer, given) as this:
         folder = paths.unfinished_folder(claimed, this.key)
@@ -127,9 +131,10 @@ def _capture(
         for text in incomplete_images(this.found, scene.frame_current):
             yield Warned(0.0, text)
         if head is None:
-            _, head = yield from _begun(this, folder, given)
+            steps = _begun(this, folder, given)
+            _, head = yield from draft.of_look(steps, this, claimed) if shows else steps
             empty(folder)
-        head = yield from _render_tiles(this.on, folder, head)
+        head = yield from _render_tiles(this.on, folder, head, shows)
     made = [(folder, claimed, head)]
     for name in takes.TAKES if this.catchers else ():
         steps = _capture_beside(scene, view_layer, claimed / name, name, head, stopped)
@@ -139,6 +144,8 @@ def _capture(
     # comes last: as long as it is unfinished, an interrupted end can be taken up again.
     for each in reversed(made):
         yield from _finish(scene, *each)
+    if not head.kept:
+        paths.remove_draft(claimed)
     if not this.catchers:
         for name in takes.TAKES:
             empty_take(claimed / name)
@@ -196,10 +203,13 @@ def _finish(
     finish(unfinished, place / "capture")
 
 
-def _render_tiles(on: Stage, folder: Path, head: CaptureHead) -> Steps[CaptureHead]:
+def _render_tiles(
+    on: Stage, folder: Path, head: CaptureHead, shows: bool = False
+) -> Steps[CaptureHead]:
     """Render the missing tiles of a capture set -> the head of the complete set.
 
-    Where the settings keep no images, the tiles are fitted as well.
+    Where the settings keep no images, the tiles are fitted as well. shows: whether a window waits
+    for a first picture.
     """
     stream = None if head.kept else Stream(folder)
     around = Around(on)
@@ -221,6 +231,8 @@ def _render_tiles(on: Stage, folder: Path, head: CaptureHead) -> Steps[CaptureHe
             stream.start(number)
 
     try:
+        if shows:
+            yield from draft.draft(on, folder, head, around)
         t = -1
         while (t := t + 1) < len(head.tiles):
             entry, tiles = head.tiles[t], len(head.tiles)
@@ -268,48 +280,6 @@ def _in_halves(folder: Path, head: CaptureHead, number: int) -> CaptureHead | No
         marked.remove_file(there, "capture")
     halves = [TileEntry(r) for e in head.tiles[number:] for r in strips_of(e.region, 2)]
     return replace(head, tiles=(*head.tiles[:number], *halves))
-
-
-def plan_of(head: CaptureHead) -> list[list[tuple[int, str]]]:
-    """The (patch, pattern name) images of each render of a tile. Raises CaptureSetError."""
-    names = [*head.patterns.patterns, *([GRAIN] if head.grain else [])]
-    return render_plan(head.told_route, head.hemicube, names)
-
-
-class Around:
-    """The planes around a stage, which stay from one tile to the next.
-
-    Cycles prepares the scene again when planes come or go. So they are changed only where a render
-    needs others than the last.
-    """
-
-    def __init__(self, on: Stage) -> None:
-        self._on = on
-        self._held = ExitStack()
-        self._images: list[tuple[int, str]] | None = None
-
-    def __enter__(self) -> Around:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._images = None
-        self._held.close()
-
-    def set_tile(self, head: CaptureHead, number: int, images: list[tuple[int, str]]) -> None:
-        """Make the stage ready to render some images of a tile."""
-        on = self._on
-        set_region(on.scene, head.tiles[number].region)
-        if images == self._images:
-            return
-        self.__exit__()
-        # the scene's own lamps are in every render; the first render separates them by group
-        sampled = head.route == Route.SAMPLED
-        own = not sampled and images == plan_of(head)[0]
-        faint, portals = head.radiance or 1.0, bool(head.portals)
-        self._held.enter_context(
-            planes.lit(on, head.hemicube, head.patterns, images, sampled, own, faint, portals)
-        )
-        self._images = images
 
 
 def render_tile(

@@ -6,7 +6,7 @@ Light groups tell the light of each patch, of the world, and the scene's own lig
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import bpy
 import numpy as np
@@ -19,9 +19,10 @@ from ...core.faces import FINEST
 from ...core.hemicube import Hemicube
 from ...core.light.environment import Environment, directions, sample_directions
 from ...core.patterns import pattern_set
+from ...core.region import Region
 from ..stage.small import parts_of, small
-from ..stage.stage import Stage
-from ..work import Steps
+from ..stage.stage import Stage, picture_region, picture_size
+from ..work import Progress, Steps
 from ..world.lamp_render import world_showing
 from . import planes
 
@@ -48,6 +49,22 @@ class Looked:
     probe: NDArray
 
 
+@dataclass
+class Glance(Progress):
+    """A step of a look: the first of its pictures is there.
+
+    hemicube: with the finest patches; region: of the picture, whose size is `shape`, (height,
+    width); own, probe: as in `Looked`; alpha: (H, W).
+    """
+
+    hemicube: Hemicube = field(default_factory=Hemicube)
+    shape: tuple[int, int] = (0, 0)
+    region: Region = field(default_factory=lambda: Region(0, 0, 0, 0))
+    own: NDArray = field(default_factory=lambda: np.empty(0))
+    alpha: NDArray = field(default_factory=lambda: np.empty(0))
+    probe: NDArray = field(default_factory=lambda: np.empty(0))
+
+
 def look(on: Stage, hemicube: Hemicube) -> Steps[Looked]:
     """Look at a prepared stage, in the light of the finest patches and of a white world -> Looked.
 
@@ -71,11 +88,16 @@ def look(on: Stage, hemicube: Hemicube) -> Steps[Looked]:
             _put_first(layer, group)
             parts = yield from parts_of(on, f"looking at the light of {len(fine)} directions")
             probe = groups_of(parts, len(fine))
-            whole, lit = combined(parts)[..., :3], probe.sum(axis=0)
-            own = whole - lit
+            whole, lit = combined(parts), probe.sum(axis=0)
+            own, alpha = whole[..., :3] - lit, whole[..., 3]
             if scene.world == white_one:
                 own = own - light_of(parts, group)
-            else:  # even the same world, set again, would have Cycles prepare the scene again
+            width, height = picture_size(scene)
+            text, region = "a first look is there", picture_region(scene)
+            yield Glance(0.0, text, fine, (height, width), region, own, alpha, probe)
+            if (
+                scene.world != white_one
+            ):  # even the same world, set again, would have Cycles prepare the scene again
                 scene.world = white_one
             scene.cycles.samples = WHITE_SAMPLES
             # Light passes as many transparent surfaces as in the artist's render, and the patches.

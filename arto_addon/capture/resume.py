@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from ...core import marked
@@ -82,7 +83,19 @@ def let_go(
     heads.write(folder, head)
     for name in files:
         marked.remove_file(folder / name, "capture")
+    _describe(folder / Stream.FIELD, head, draft=True)
     return head
+
+
+def _describe(partial: Path, head: CaptureHead, draft: bool | None = None) -> None:
+    """Write the description of the field of those tiles of a capture that are fitted.
+
+    draft: whether some are missing: Live shows those that are there.
+    """
+    fitted = [tile.fitted for tile in head.tiles if tile.fitted is not None]
+    about = replace(about_of(head, *head.told_choice), draft=draft)
+    described = FieldHead(head.hemicube, head.height, head.width, about)
+    write_head(partial, described.with_tiles(fitted, partial))
 
 
 def finish_field(unfinished: Path, folder: Path, head: CaptureHead) -> None:
@@ -95,16 +108,12 @@ def finish_field(unfinished: Path, folder: Path, head: CaptureHead) -> None:
         raise FieldError(
             f"the fitted tiles of {unfinished} are gone: discard it, and capture again"
         )
-    captured = CaptureSet(unfinished)
-    fitted = [tile.fitted for tile in head.tiles if tile.fitted is not None]
-    if left := len(head.tiles) - len(fitted):
+    if left := sum(tile.fitted is None for tile in head.tiles):
         raise FieldError(
             f"{left} of {len(head.tiles)} tiles of {unfinished} are not fitted: run "
             "Capture again, it goes on from there"
         )
-    about = about_of(captured, *head.told_choice)
-    described = FieldHead(captured.hemicube, *captured.shape, about)
-    write_head(partial, described.with_tiles(fitted, partial))
+    _describe(partial, head)
     try:
         replace_folder(partial, folder)
     except OSError as e:

@@ -22,7 +22,8 @@ from ...core.files import PART, Lock, moved, replace_folder
 from ...core.fit.fit import fit as fit_captured
 from ...core.fit.fit import fit_into
 from ..capture import room
-from ..capture.capture import check_file, plan_of
+from ..capture.around import plan_of
+from ..capture.capture import check_file
 from ..capture.check import check_place
 from ..capture.resume import empty_take, finish, finish_field, let_go
 from ..capture.stream import Stream

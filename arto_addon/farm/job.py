@@ -25,7 +25,7 @@ from ...core.file_names import is_text
 from ..blender import scripts
 from ..blender.front import to_front
 from ..capture import room
-from ..capture.capture import plan_of
+from ..capture.around import plan_of
 from ..capture.room import Estimate
 from ..capture.sequence import frame_kept
 from ..capture.stream import Stream

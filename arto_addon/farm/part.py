@@ -23,8 +23,9 @@ from ...core.fit.fit import fit_into
 from ..blender import devices
 from ..blender.output import write_to
 from ..capture import room
+from ..capture.around import Around, plan_of
 from ..capture.asked import Asked, asked
-from ..capture.capture import Around, plan_of, render_tile
+from ..capture.capture import render_tile
 from ..capture.check import check_scene
 from ..capture.planned import Given
 from ..capture.stream import Stream

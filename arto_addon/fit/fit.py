@@ -75,6 +75,7 @@ def fit(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps[Path]:
                 there = CaptureSet(folder.parent / name / "capture")
                 yield from _fit_one(scene, there, target.parent / name / "field")
         yield from _fit_one(scene, captured, target)
+        paths.remove_draft(target.parent)
     paths.forget()
     text = f"fitted {len(captured.hemicube)} patches of {captured.pixels} pixels"
     yield Wrote(1.0, text, target)

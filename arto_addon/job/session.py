@@ -210,6 +210,8 @@ LEAVE = 3.0
 outcome: Outcome | None = None
 # By verb, what the window does with the result of a job.
 finishers: dict[Verb, Callable[[SecondBlender], str]] = {}
+# What the window does at each look at a job that runs.
+followers: list[Callable[[SecondBlender], None]] = []
 
 
 def asked_for() -> SecondBlender | None:
@@ -288,6 +290,8 @@ def _follow() -> float | None:
     job = current
     if job.look():
         _show_share(job)
+        for follow in followers:
+            follow(job)
         watch.redraw()
         return EVERY
     if job.state.end == "done" and _in_the_middle():

@@ -66,13 +66,21 @@ def _relight_looks(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
     return (yield from relight_looks(scene, view_layer))[0]
 
 
+def _capture(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
+    return capture(scene, view_layer, shows=True)
+
+
+def _shoot(scene: bpy.types.Scene, view_layer: str) -> Steps[Path | None]:
+    return shoot(scene, view_layer, shows=True)
+
+
 VERBS: Mapping[Verb, Work] = {
-    "capture": Work(capture, "capturing", captures=True),
+    "capture": Work(_capture, "capturing", captures=True),
     "fit": Work(fit, "fitting", captures=True),
     "relight": Work(_relight, "relighting"),
     "capture_frames": Work(_capture_frames, "capturing the frames of", captures=True),
     "relight_frames": Work(_relight_frames, "relighting the frames of"),
-    "shoot": Work(shoot, "capturing", captures=True),
+    "shoot": Work(_shoot, "capturing", captures=True),
     "relight_looks": Work(_relight_looks, "relighting the looks of"),
     "verify": Work(verify_plate, "verifying the plate of"),
     "composite": Work(save_composite, "compositing"),

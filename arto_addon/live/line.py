@@ -46,3 +46,19 @@ def other_shot(was: tuple, now: tuple) -> str:
     if was[2:] == now[2:]:
         return tr("The light of frame {now}, on the shot of frame {was}", now=now[0], was=was[0])
     return tr("Live shows the shot that it was switched on for: this is another one")
+
+
+def draft_line(size: tuple[int, int], progress: tuple[int, int, bool] | None) -> str:
+    """Say that the picture is of a capture that is not complete.
+
+    size: (height, width) of its draft; progress: see `source.Opened`.
+    """
+    h, w = size
+    if progress is None:
+        return tr("From a draft of {w} x {h}; the capture has begun", w=w, h=h)
+    done, tiles, goes_on = progress
+    if goes_on:
+        text = "From a draft of {w} x {h}; the capture is at tile {at} of {tiles}"
+        return tr(text, w=w, h=h, at=min(done + 1, tiles), tiles=tiles)
+    text = "From a draft of {w} x {h}; the capture stopped, {done} of {tiles} tiles are there"
+    return tr(text, w=w, h=h, done=done, tiles=tiles)

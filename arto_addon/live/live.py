@@ -19,28 +19,25 @@ from bpy.app.handlers import persistent
 
 from ...core import exr
 from ...core.errors import ArtoError, SceneError
-from ...core.preview import Preview
 from ..blender import handlers
 from ..blender.editors import redraw, reveal
-from ..blender.markers import camera_of
 from ..blender.quitting import not_when_quitting, when_quitting
 from ..blender.words import tr
 from ..job import session
 from ..plate.names import relit_file
 from ..plate.plate import name_of
 from ..relight.light_key import HEADER, light_key
-from ..relight.shown import Shown, check_film
+from ..relight.shown import check_film
 from ..shot import watch
-from ..shot.shot import check_same_shot, layer_of
-from ..stage.stage import picture_size
-from ..world.background import holds_out
+from ..shot.shot import layer_of
 from ..world.check import check_world, world_of
 from ..world.kept import shows
 from ..world.own import gains_of
 from . import maps
 from .image import Seen, push, put_away, seen, show_plate
-from .line import FINISHED_LINE, lacking, line, other_shot
+from .line import FINISHED_LINE, draft_line, lacking, line, other_shot
 from .quick import Quick
+from .source import Newest, Opened, place_of, source_of
 from .viewer import Viewer, Wish
 from .wished import Light, Wished
 
@@ -55,36 +52,28 @@ WHOLE, FINISHED = 0.25, 2.0
 class Live:
     """A shot that follows its world."""
 
-    def __init__(self, scene: bpy.types.Scene) -> None:
-        """Open the shot's field and start the Blender that makes maps.
+    def __init__(self, scene: bpy.types.Scene, by_itself: bool = False) -> None:
+        """Open the shot's field, or its draft, and start the Blender that makes maps.
 
-        Raises what opening the field raises, and SceneError where the scene has no usable world.
+        by_itself: whether a capture switched Live on, to show its first picture. Raises what
+        opening the field raises, and SceneError where the scene has no usable world.
         """
         self.scene_uid = scene.session_uid
         self.scene_name, self.blend = scene.name, bpy.data.filepath
         self.layer = layer_of(scene)
         self.name = name_of(scene)
         check_world(scene, self.layer)
-        shown = Shown(scene, self.layer)
-        check_same_shot(scene, shown.field.about.shot, "the reflectance field", self.layer)
-        check_film(scene, shown.field)
-        self.field = shown.field
-        self.folder = shown.field.folder
-        self.written = (self.folder / "field.json").stat().st_mtime_ns
-        fields = [take.field for take in shown.takes]
-        self.viewer = Viewer(Preview(fields, holds_out(scene, self.layer)))
+        self.by_itself = by_itself
+        self.opened = Opened(scene, self.layer, source_of(scene, self.layer))
+        self.viewer = Viewer(self.opened.preview)
         self.maps, self.quick, self._seen = maps.Maps(), Quick(), Seen()
-        self.shape = shown.field.shape
-        # outside this render region a picture is empty
-        self.region = shown.field.region
-        self._shot = self._place(scene)
-        # what a live picture lacks and the relight adds, in words
-        self.held, self.behind = shown.held, True
+        self._shot = place_of(scene)
+        self.behind = True  # whether the world behind is in the picture
         # what Live has to say, why there is no map, and which film the shot was not captured for
         self.trouble = self.problem = self.film = ""
         self.line = "Starting"
         self.dirty = True
-        self._looked = 0.0
+        self._looked, self._source = 0.0, Newest(self.opened)
         self._now: Light | None = None
         self._changed = 0.0
         self._wished: Wished | None = None
@@ -95,8 +84,7 @@ class Live:
         # how long the last relight took, in seconds; why it failed
         self.took: float | None = None
         self.failed = ""
-        # whether the plate is of the light as it is now, so that it is shown in place of the live
-        # image
+        # whether the plate, which is of the light as it is now, is shown in place of the live image
         self.finished = False
         self.revealed = False
         self.maps.start()
@@ -125,33 +113,29 @@ class Live:
         shown = self.viewer.take()
         if shown is not None and not self.finished:
             picture = np.repeat(np.repeat(shown.picture, shown.factor, 0), shown.factor, 1)
-            self.name = name_of(scene)
-            image = push(picture[: self.shape[0], : self.shape[1]], self.name)
+            self.name, (height, width) = name_of(scene), self.opened.size
+            image = push(picture[:height, :width], self.name)
             if not self.revealed:
                 self.revealed = True
                 if not seen(image):
                     reveal(image)
-            lacks = lacking(scene, self.held, self.behind, shown.suns)
-            self.line = line(scene, shown, lacks, self.took)
+            if not self.opened.draft:
+                lacks = lacking(scene, self.opened.held, self.behind, shown.suns)
+                self.line = line(scene, shown, lacks, self.took)
             redraw()
             watch.redraw()
         said = self.maps.trouble_with(self._now.key) if self._now else ""
         trouble = self.film or self.problem or said or self.viewer.trouble or self.failed
-        if self._place(scene) != self._shot:
-            trouble = other_shot(self._shot, self._place(scene))
+        if place_of(scene) != self._shot:
+            trouble = other_shot(self._shot, place_of(scene))
         if trouble != self.trouble:
             self.trouble = trouble
             watch.redraw()
         return True
 
     def _check(self, scene: bpy.types.Scene) -> None:
-        """Raise SceneError where what is open is not what Live was switched on for."""
-        try:
-            written = (self.folder / "field.json").stat().st_mtime_ns
-        except OSError:
-            written = None
-        if written != self.written:
-            raise SceneError("the shot was captured anew: switch Live on again")
+        """Open what is newer, and raise SceneError where Live cannot go on."""
+        self._open_newer(scene)
         if bpy.data.filepath != self.blend:
             raise SceneError("the file has another name now: switch Live on again")
         windows = bpy.context.window_manager.windows
@@ -160,12 +144,20 @@ class Live:
                 f"Live was on for the scene '{self.scene_name}': switch it on for this one"
             )
 
-    @staticmethod
-    def _place(scene: bpy.types.Scene) -> tuple[int, float, str, int, int]:
-        """What tells this shot from other shots of the scene: frame, camera and picture size."""
-        bound = camera_of(scene)
-        camera = bound.name if bound else ""
-        return scene.frame_current, scene.frame_subframe, camera, *picture_size(scene)
+    def _open_newer(self, scene: bpy.types.Scene) -> None:
+        """Open what is newer: a draft of a capture that began, its next tile, then its field.
+
+        Raises SceneError where what was open is gone, or is of another capture.
+        """
+        found = self._source.newer(self.opened, scene, self.layer, place_of(scene) == self._shot)
+        if found is not None:
+            self.opened = found
+            self.viewer.close(wait=False)
+            self.viewer, self._wished, self._now = Viewer(found.preview), None, None
+            self.dirty = True
+        if self.opened.draft and self.line != (said := draft_line(*self._source.said)):
+            self.line = said
+            watch.redraw()
 
     def _look(self, scene: bpy.types.Scene, now: float) -> None:
         """Note what the world is now, and when it last changed."""
@@ -178,7 +170,7 @@ class Live:
         found = Light(key, strength, turn, own, gains, clear, settings.live_finish)
         self.film = ""
         try:
-            check_film(scene, self.field)
+            check_film(scene, self.opened.field)
         except SceneError as e:
             self.film = str(e)
         if found == self._now:
@@ -230,10 +222,13 @@ class Live:
         if wished != self._wished:
             self._wished = wished
             gains = gains_of(scene)
-            view = self._seen.view(scene, light.clear, world, key, self.shape, self.region)
+            view = self._seen.view(
+                scene, light.clear, world, key, self.opened.size, self.opened.region
+            )
             self.behind = light.clear or view is not None
             self.viewer.wish(Wish(image, strength, turn, light.own, gains, wished.whole, view))
-        if light.finish and not self.finished and rest > FINISHED and self.settled:
+        finishes = light.finish and not self.opened.draft
+        if finishes and not self.finished and rest > FINISHED and self.settled:
             self._finish(scene)
 
     @property
@@ -281,12 +276,12 @@ class Live:
 
     def _is_finished(self, scene: bpy.types.Scene, world: bpy.types.World) -> bool:
         """Whether the plate on disk is already of this light and this field, and to be shown."""
-        if not scene.arto.live_finish:
+        if not scene.arto.live_finish or self.opened.draft:
             return False
         try:
             path = relit_file(scene)
             same = exr.header(path).get(HEADER) == light_key(scene, world, self.layer)
-            return same and path.stat().st_mtime_ns >= self.written
+            return same and path.stat().st_mtime_ns >= self.opened.source.written
         except (ArtoError, OSError):
             return False
 
@@ -303,12 +298,12 @@ current: Live | None = None
 trouble = ""
 
 
-def start(scene: bpy.types.Scene) -> None:
-    """Switch Live on for a scene. Raises what `Live` raises."""
+def start(scene: bpy.types.Scene, by_itself: bool = False) -> None:
+    """Switch Live on for a scene. by_itself: see `Live`. Raises what `Live` raises."""
     global current, trouble
     stop()
     trouble = ""
-    current = Live(scene)
+    current = Live(scene, by_itself)
     if not bpy.app.timers.is_registered(_tick):
         bpy.app.timers.register(_tick, first_interval=0.0)
 

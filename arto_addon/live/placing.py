@@ -16,7 +16,7 @@ from ...core.place.lobes import lobes_at
 from ...core.place.place import Placed, What, facing, grazing, normal_at, reflected, shading
 from ..blender.markers import camera_of
 from ..kit import kit as kits
-from ..relight.shown import Shown
+from ..relight.shown import Shown, newest
 from ..shot.shot import layer_of
 from ..world import dials, kept
 from ..world.check import check_world, world_of
@@ -38,10 +38,12 @@ class Placer:
     def __init__(self, scene: bpy.types.Scene) -> None:
         self.scene = scene
         layer = layer_of(scene)
-        shown = Shown(scene, layer)
+        shown = Shown(scene, layer, newest(scene, layer))
+        self.shown = shown
         self.field = shown.takes[-1].field if len(shown.takes) > 1 else shown.field
-        self.shape = self.field.shape
-        self._view = view_of(scene, self.shape, self.field.region)
+        # of the picture that is clicked into
+        self.shape = shown.size
+        self._view = view_of(scene, self.field.shape, self.field.region)
         there = self.field.has_layer("position")
         self._position = self.field.layer("position") if there else None
         self._normal = self.field.layer("normal") if self.field.has_layer("normal") else None
@@ -52,6 +54,7 @@ class Placer:
 
         without: the light that is put there. Raises FieldError.
         """
+        x, y = self.shown.pixel(x, y)
         lobes = lobes_at(self.field, x, y)
         eye = self._view[y, x] if self._view is not None else None
         normal = self._normal_at(x, y, eye)

@@ -20,7 +20,7 @@ from ..world import kept
 from ..world.check import check_world
 from ..world.own import own_of
 from .layers import parts_of
-from .shown import Shown
+from .shown import Shown, newest
 
 IMAGE, FROM = "ARTO Inside", "ARTO Light From"
 SIDE = 192
@@ -62,10 +62,11 @@ def look(scene: bpy.types.Scene, x: int, y: int) -> Seen:
     nothing was captured at this pixel.
     """
     layer = layer_of(scene)
-    shown = Shown(scene, layer)
+    shown = Shown(scene, layer, newest(scene, layer))
     field = shown.takes[-1].field if len(shown.takes) > 1 else shown.field
     environment = environment_of(scene)
     light = PatchLight(environment, field.hemicube)
+    asked, (x, y) = (x, y), shown.pixel(x, y)
     parts = parts_at(field, light, x, y)
     own = float(own_of(scene, field)[y, x].sum())
     if scene.arto.layers == "GROUPS" and scene.arto.groups:
@@ -80,7 +81,7 @@ def look(scene: bpy.types.Scene, x: int, y: int) -> Seen:
         told.append(("own", own / total))
     told = sorted((t for t in told if t[1] >= 0.005), key=lambda t: -t[1])
     pixel = np.sum([p.light for p in parts], axis=0) if parts else np.zeros(3)
-    lines = [f"Pixel {x}, {y}: {pixel[0]:.3g}, {pixel[1]:.3g}, {pixel[2]:.3g}"]
+    lines = [f"Pixel {asked[0]}, {asked[1]}: {pixel[0]:.3g}, {pixel[1]:.3g}, {pixel[2]:.3g}"]
     if told:
         lit = [f"{share:.0%} by {_WORDS.get(name, name)}" for name, share in told[:5]]
         lines.append(f"Lit {', '.join(lit)}")
@@ -117,7 +118,8 @@ def direction_at(scene: bpy.types.Scene, name: str, u: float, v: float) -> NDArr
     hemicube.
     """
     if name == IMAGE:
-        shown = Shown(scene, layer_of(scene))
+        layer = layer_of(scene)
+        shown = Shown(scene, layer, newest(scene, layer))
         around, patch, _, _ = unfolded(shown.field.hemicube, SIDE)
         h, w = patch.shape
         row, column = min(int((1 - v) * h), h - 1), min(int(u * w), w - 1)
@@ -134,7 +136,8 @@ def light_from(scene: bpy.types.Scene, direction: NDArray) -> tuple[NDArray[np.f
 
     Raises SceneError, FieldError.
     """
-    shown = Shown(scene, layer_of(scene))
+    layer = layer_of(scene)
+    shown = Shown(scene, layer, newest(scene, layer))
     environment = environment_of(scene)
     x, y, z = direction / np.linalg.norm(direction)
     azimuth, elevation = math.atan2(y, x), math.asin(z)

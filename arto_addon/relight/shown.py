@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from ...core.capture.kinds import Route
 from ...core.catcher import held_out
 from ...core.cryptomatte import Mattes
-from ...core.errors import FieldError, SceneError
+from ...core.errors import ArtoError, FieldError, SceneError
 from ...core.field.field import Field
 from ...core.light.environment import Environment
 from ...core.light.lamps import Split, split
@@ -25,7 +26,7 @@ from ..blender import denoise
 from ..fit import guides
 from ..plate import mattes
 from ..plate.footage import footage
-from ..shot import paths, watch
+from ..shot import paths, status, watch
 from ..shot.fingerprint import Fingerprint, changes, key_of
 from ..shot.shot import check_same_shot
 from ..stage import takes
@@ -77,6 +78,25 @@ def check_film(scene: bpy.types.Scene, field: Field) -> None:
         )
 
 
+def newest(scene: bpy.types.Scene, view_layer: str) -> Path:
+    """The folder of the field that a shot is looked at in, which may be a draft.
+
+    It is the shot's field where that is of the scene as it is. Else it is the draft of a capture
+    that is not complete, where there is one of this shot. Raises SceneError, ShotError.
+    """
+    folder = paths.field_folder(scene, view_layer)
+    line = status.field_line(scene, view_layer)
+    if line is not None and line[1]:
+        return folder
+    there = status.draft_of(folder.parent)
+    if there is None:
+        return folder
+    with contextlib.suppress(ArtoError):
+        check_same_shot(scene, there.about.shot, "the draft", view_layer)
+        return there.folder
+    return folder
+
+
 class Shown:
     """The opened field of a shot, shared by all the lights that the shot is shown in.
 
@@ -88,6 +108,11 @@ class Shown:
         self.scene, self.layer = scene, view_layer
         if folder is None:
             folder = paths.field_folder(scene, view_layer)
+            if not folder.exists() and (left := status.unfinished(folder.parent)):
+                raise FieldError(
+                    f"the capture is not complete ({left[0]}), and no plate is made of its draft: "
+                    "run Capture again, it goes on from there"
+                )
             if not folder.exists() and not paths.capture_folder(scene, view_layer).exists():
                 near = paths.nearest(scene, view_layer)
                 check_same_shot(scene, near, "the reflectance field", view_layer)
@@ -107,6 +132,17 @@ class Shown:
         self._others: list[Shown] = []
         if self.field.about.catchers and not self.field.about.take:
             self._others = [self._beside(folder.parent / name / "field") for name in takes.TAKES]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Height and width of the shot's picture, also where the field is a smaller draft."""
+        shot = self.field.about.shot
+        return (shot.height, shot.width) if self.field.about.draft and shot else self.field.shape
+
+    def pixel(self, x: int, y: int) -> tuple[int, int]:
+        """The field's pixel that shows a pixel of the shot's picture, from the left and the top."""
+        (height, width), (h, w) = self.size, self.field.shape
+        return x * w // width, y * h // height
 
     @property
     def takes(self) -> list[Shown]:

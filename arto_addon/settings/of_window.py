@@ -84,6 +84,19 @@ SHOWN = (
         panels=("Light",),
     ),
     Setting(
+        name="live_first",
+        kind="switch",
+        title="Show Captures",
+        words="Switch Live on by itself once a capture has a draft, so that the shot is seen "
+        "in its light long before the capture is complete",
+        default=True,
+        work="relight",
+        decides=Decides.NOTHING,
+        farm=False,
+        option=False,
+        panels=("Quality",),
+    ),
+    Setting(
         name="looks",
         kind="list",
         work="relight",

@@ -19,6 +19,7 @@ from pathlib import Path
 
 import bpy
 
+from ...core import marked
 from ...core.capture.head import HEADER as CAPTURE_HEADER
 from ...core.description import Description
 from ...core.errors import ArtoError, SceneError, ShotError
@@ -331,6 +332,19 @@ def _says(path: Path, text: str) -> bool:
 def worlds_folder(scene: bpy.types.Scene) -> Path:
     """The folder of the maps of worlds, which all shots share."""
     return _root(scene) / "worlds"
+
+
+def draft_folder(folder: Path) -> Path:
+    """The folder of the draft of a capture that is not complete, in the folder of its shot."""
+    return folder / "draft"
+
+
+def remove_draft(folder: Path) -> None:
+    """Remove the draft from the folder of a shot whose capture is complete, or is given up.
+
+    A draft that cannot be removed is of no capture any more, so nobody looks at it.
+    """
+    marked.remove_quietly(draft_folder(folder), "field", folder)
 
 
 def forget() -> None:

@@ -167,6 +167,27 @@ def field_of(source: Path) -> Field | None:
         return None
 
 
+def draft_of(source: Path, key: str | None = None) -> Field | None:
+    """Open the draft in a shot's folder; None where there is none, or its capture is complete.
+
+    key: of the capture; any by default.
+    """
+    try:
+        there = _fields.get(paths.draft_folder(source) / FIELD_HEADER)
+    except OSError:
+        return None
+    if there is None or not there.about.draft or key not in (None, there.about.key):
+        return None
+    whole = field_of(source)
+    return None if whole and whole.about.key == there.about.key else there
+
+
+def has_draft(scene: bpy.types.Scene) -> bool:
+    """Whether the scene's shot can be looked at in a draft, see `draft_of`."""
+    place = _place(scene, None)
+    return place is not None and not place.owner and draft_of(place.source) is not None
+
+
 _sizes: dict[Path, tuple[float, int]] = {}
 
 

@@ -25,14 +25,14 @@ _RENDER = ("resolution_x", "resolution_y", "resolution_percentage", "use_crop_to
 
 
 @contextmanager
-def small(on: Stage, samples: int) -> Iterator[None]:
-    """Make the stage so small that the captured region has about `PIXELS`; put back at the end.
+def small(on: Stage, samples: int, pixels: int = PIXELS) -> Iterator[None]:
+    """Make the stage so small that the captured region has about so many pixels, and put it back.
 
     The captured region is the artist's render region, or the whole picture.
     """
     render, cycles = on.scene.render, on.scene.cycles
     width, height = picture_size(on.scene)
-    share = math.sqrt(PIXELS / picture_region(on.scene).pixels)
+    share = math.sqrt(pixels / picture_region(on.scene).pixels)
     were = [(render, name, getattr(render, name)) for name in _RENDER]
     were.append((cycles, "samples", cycles.samples))
     try:

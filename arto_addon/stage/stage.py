@@ -88,14 +88,14 @@ class Stage:
         """
         self.scene.render.use_persistent_data = True
 
-    def about_to_render(self) -> None:
-        """Note that a render begins.
+    def about_to_render(self, most: int = 0) -> None:
+        """Note that a render begins. most: the samples of a longer render that follows it.
 
         A scene that Cycles kept goes on with the sequence of its longest render. Where a render has
         fewer samples, Cycles prepares the scene again: its noise is then that of such a render.
         """
         samples = self.scene.cycles.samples
-        if self.is_kept and samples < self._longest:
+        if self.is_kept and max(samples, most) < self._longest:
             self.renew()
         self._longest = max(self._longest, samples)
 

@@ -75,7 +75,7 @@ def _world(column: bpy.types.UILayout, context: bpy.types.Context, world: bpy.ty
 
 def _live(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
     scene = context.scene
-    there = status.field_line(scene) is not None
+    there = status.field_line(scene) is not None or status.has_draft(scene)
     row = column.row(align=True)
     row.scale_y = 1.3
     row.enabled = there or live.current is not None

@@ -9,10 +9,12 @@ from ...core.errors import ArtoError
 from ..blender.editors import Editor, editors, reveal
 from ..blender.pictures import put
 from ..job import session
+from ..live import live
 from ..live.image import IMAGE as LIVE
 from ..plate import compare
 from ..plate.plate import name_of
 from ..relight import inside
+from ..shot import status
 from ..world import controls
 from ..world.check import world_of
 from .operators import Quick, can_relight, free
@@ -45,8 +47,19 @@ def under(context: bpy.types.Context, event: bpy.types.Event) -> tuple[Editor, f
 def show_relit_picture(scene: bpy.types.Scene) -> None:
     """Show the plate, where no picture of the shot is shown that could be clicked into."""
     showing = {e.image.name for e in editors() if e.image}
-    if not showing & {name_of(scene), LIVE, inside.FROM}:
+    if showing & {name_of(scene), LIVE, inside.FROM}:
+        return
+    if status.has_draft(scene):
+        live.start(scene)
+    else:
         bpy.ops.arto.show_plate()
+
+
+def can_look(cls: type, context: bpy.types.Context) -> bool:
+    """Whether there is a world, and a field to look at, or a draft, also while it is captured."""
+    if world_of(context.scene) is not None and status.has_draft(context.scene):
+        return True
+    return free(cls) and can_relight(cls, context)
 
 
 class Picking(Quick):
@@ -56,9 +69,7 @@ class Picking(Quick):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not free(cls):
-            return False
-        return can_relight(cls, context)
+        return can_look(cls, context)
 
     def begin(self, context: bpy.types.Context) -> None:
         """Show the picture to click into. Raises ArtoError."""
@@ -150,7 +161,8 @@ from there gives to it"""
         showing = {e.image.name for e in editors() if e.image}
         if inside.IMAGE in showing or (hdri and hdri.name in showing):
             return
-        shown = inside.Shown(scene, inside.layer_of(scene))
+        layer = inside.layer_of(scene)
+        shown = inside.Shown(scene, layer, inside.newest(scene, layer))
         environment = inside.environment_of(scene)
         picture = inside.drawn(shown.field.hemicube, environment, [], inside.SIDE, show=0.0)
         reveal(put(inside.IMAGE, picture, display=True))

@@ -360,6 +360,7 @@ class ARTO_OT_discard_unfinished(Removes):
             ]:
                 remove_capture(folder, place)
                 gone += 1
+            paths.remove_draft(place.folder)
         paths.forget()
         return f"removed {gone} unfinished captures" if gone else "there is none unfinished"
 

@@ -18,8 +18,7 @@ from ..live.image import IMAGE as LIVE
 from ..live.placing import Gesture
 from ..plate.plate import name_of
 from .kit_operators import choose, chosen, world_to_change
-from .look_inside import under
-from .operators import can_relight, free
+from .look_inside import can_look, under
 
 WHATS = (
     ("REFLECT", "Reflect", "The mirror image of the light stands under the cursor"),
@@ -104,7 +103,7 @@ view. Drag moves it, the wheel sizes it, Shift turns it, Ctrl changes its streng
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return free(cls) and can_relight(cls, context)
+        return can_look(cls, context)
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
         self.report({"ERROR"}, "this is a button for a mouse: it waits for a click")

@@ -145,6 +145,7 @@ class Quality(Draws):
         sub.prop(settings, "denoise")
         if denoise.known() is False:
             say(column, context, "This Blender was built without Open Image Denoise", "INFO")
+        column.prop(settings, "live_first")
         column.prop(settings, "lamps")
         if settings.lamps:
             column.prop(settings, "lamp_samples")

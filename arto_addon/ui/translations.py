@@ -68,6 +68,10 @@ Mix to Scene | Mischung in die Szene | ミックスをシーンへ
 Live | Live | ライブ
 Show Patches | Lichtfelder zeigen | パッチを表示
 Finish When Resting | In Ruhe fertigstellen | 静止時に仕上げる
+Show Captures | Aufnahmen zeigen | キャプチャを表示
+From a draft of {w} x {h}; the capture has begun | Aus einem Entwurf von {w} x {h}; die Aufnahme hat begonnen | {w} x {h} の下書きから。キャプチャが始まりました
+From a draft of {w} x {h}; the capture is at tile {at} of {tiles} | Aus einem Entwurf von {w} x {h}; die Aufnahme ist bei Kachel {at} von {tiles} | {w} x {h} の下書きから。キャプチャはタイル {at} / {tiles}
+From a draft of {w} x {h}; the capture stopped, {done} of {tiles} tiles are there | Aus einem Entwurf von {w} x {h}; die Aufnahme hielt an, {done} von {tiles} Kacheln sind da | {w} x {h} の下書きから。キャプチャは停止し、タイルは {done} / {tiles}
 Render the HDRI's Suns | Sonnen des HDRI rendern | HDRIの太陽をレンダー
 Sun Samples | Sonnen-Samples | 太陽のサンプル
 Scene Lamps | Lampen der Szene | シーンのランプ

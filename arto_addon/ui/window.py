@@ -8,10 +8,11 @@ from pathlib import Path
 import bpy
 from bpy.app.handlers import persistent
 
+from ...core.errors import ArtoError
 from ..blender.editors import reveal
 from ..job import session, snapshot
 from ..job.session import SecondBlender
-from ..job.verbs import Verb
+from ..job.verbs import VERBS, Verb
 from ..live import live
 from ..live.image import put_away
 from ..match import apply
@@ -23,10 +24,12 @@ from ..plate.present import present, present_frames
 from ..plate.verify import verify_file
 from ..relight import inside
 from ..relight.many import frames_of
+from ..relight.shown import newest
 from ..shot import paths
 from ..shot.shot import layer_of
 from ..shot.status import field_of
 from ..world import own
+from ..world.check import world_of
 from . import overlay
 
 
@@ -54,6 +57,30 @@ def show_relit(job: SecondBlender) -> str:
     return job.state.text
 
 
+# The folder of the job whose first picture was shown.
+_showed: Path | None = None
+
+
+def show_first(job: SecondBlender) -> None:
+    """Switch Live on once a capture has a draft, where the shot's field is not of the scene."""
+    global _showed
+    if job.folder == _showed or not VERBS[job.verb].captures:
+        return
+    scene = _scene_of(job)
+    if scene is None or not scene.arto.live_first or world_of(scene) is None:
+        return
+    if live.current is not None or bpy.context.window_manager.windows[0].scene != scene:
+        return
+    folder = paths.place(scene, layer_of(scene), fresh=False).folder
+    if newest(scene, layer_of(scene)) != paths.draft_folder(folder):
+        return
+    _showed = job.folder  # once: an artist may switch it off
+    try:
+        live.start(scene, by_itself=True)
+    except ArtoError as e:
+        live.trouble = str(e)
+
+
 def show_captured(job: SecondBlender) -> str:
     """Bring the light groups of an ended capture into the panel, and show the shot in its light."""
     scene = _scene_of(job)
@@ -62,6 +89,8 @@ def show_captured(job: SecondBlender) -> str:
         if there is not None:
             own.sync(scene, there)
     if job.verb == "shoot" and job.state.result:
+        if live.current is not None and live.current.by_itself:
+            live.stop()  # the plate takes its place
         return show_relit(job)
     return job.state.text
 
@@ -145,6 +174,7 @@ _FINISHERS: dict[Verb, Callable[[SecondBlender], str]] = {
 
 def register() -> None:
     session.finishers.update(_FINISHERS)
+    session.followers.append(show_first)
     if not bpy.app.background:
         bpy.app.handlers.save_pre.append(_before_save)
         bpy.app.handlers.load_post.append(_another_file)
@@ -153,6 +183,8 @@ def register() -> None:
 def unregister() -> None:
     for verb in _FINISHERS:
         session.finishers.pop(verb, None)
+    if show_first in session.followers:
+        session.followers.remove(show_first)
     compare.forget()
     if _another_file in bpy.app.handlers.load_post:
         bpy.app.handlers.load_post.remove(_another_file)

@@ -47,6 +47,8 @@ class About:
         "clean" where albedo and normals were denoised.
     proxy : int
         Of a proxy, how many pixels a side each of its pixels covers.
+    draft : bool
+        Whether it is a small picture of a capture that is not complete. No plate is made of it.
     fit_seconds, read_seconds : float
         How long the fit took, and how much of that the reading of the images did.
     others : mapping
@@ -73,6 +75,7 @@ class About:
     portals: bool | None = None
     guides: str | None = None
     proxy: int | None = None
+    draft: bool | None = None
     fit_seconds: float | None = None
     read_seconds: float | None = None
     others: Mapping[str, Any] = field(default_factory=dict)
@@ -122,6 +125,7 @@ class About:
             portals=said.kind("portals", bool),
             guides=said.some_text("guides"),
             proxy=said.count("proxy", 1, 64),
+            draft=said.kind("draft", bool),
             fit_seconds=said.real("fit_seconds", 0, LONGEST),
             read_seconds=said.real("read_seconds", 0, LONGEST),
             others=said.others([f.name for f in fields(About)]),

@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from ..capture.basis_images import BasisImages
 from ..capture.capture_set import CaptureSet
+from ..capture.head import CaptureHead
 from ..capture.moments import Moments
 from ..capture.tile_data import TileData
 from ..field.about import About
@@ -200,12 +201,13 @@ def fit_into(
     raise AssertionError("a fit ends with its tile")
 
 
-def about_of(captured: CaptureSet, choice: str, separate: bool) -> About:
+def about_of(head: CaptureHead, choice: str, separate: bool) -> About:
     """Collect what the description of a field says beside its tiles.
 
     Parameters
     ----------
-    captured : CaptureSet
+    head : CaptureHead
+        Of the capture set.
     choice : str
     separate : bool
 
@@ -213,7 +215,6 @@ def about_of(captured: CaptureSet, choice: str, separate: bool) -> About:
     -------
     About
     """
-    head = captured.head
     return About(
         choice=choice,
         separate=separate,
@@ -241,6 +242,7 @@ def fit(
     folder: Path,
     choice: str = "auto",
     separate: bool = False,
+    draft: bool = False,
 ) -> Iterator[tuple[float, str]]:
     """Fit a whole capture set and write the field.
 
@@ -256,6 +258,8 @@ def fit(
         One of `choice.CHOICES`.
     separate : bool
         Whether each channel gets a support of its own.
+    draft : bool
+        Whether it is a small picture of a capture that is not complete, see `About`.
 
     Yields
     ------
@@ -275,7 +279,9 @@ def fit(
     """
     choices.check(choice, captured.patterns, separate)
     begun, reading = time.perf_counter(), 0.0
-    about = about_of(captured, choice, separate)
+    about = replace(about_of(captured.head, choice, separate), draft=draft or None)
+    if draft:  # it has no takes beside it
+        about = replace(about, catchers=None, take=None)
     writer = FieldWriter(folder, captured.hemicube, captured.shape, about)
     try:
         tiles = len(captured.regions)

@@ -342,7 +342,7 @@ def test_another_film_while_it_is_on(scene, on) -> None:
         assert (clear[..., 3] < 1).any() and (opaque[..., 3] == 1).all()
         scene.render.film_transparent = True
         np.testing.assert_array_equal(_rest(on), clear)
-        on.field = SimpleNamespace(about=replace(on.field.about, portals=True))
+        on.opened.field = SimpleNamespace(about=replace(on.opened.field.about, portals=True))
         on.dirty = True
         assert on.tick() and "Ray Portals" in on.trouble
         made = on.viewer.made

@@ -119,8 +119,8 @@ def test_lists_decide_what_they_say(scene):
 
 # What no file of a plate has: how the window shows it, and the names by which it is found.
 OF_NO_PLATE = {
-    "look", "output", "overwrite", "use_in_compositor", "compare", "wipe", "live_finish", "looks",
-    "active_look", "active_own_group", "active_group",
+    "look", "output", "overwrite", "use_in_compositor", "compare", "wipe", "live_finish",
+    "live_first", "looks", "active_look", "active_own_group", "active_group",
 }  # fmt: skip
 
 
