@@ -25,6 +25,8 @@ class Route(StrEnum):
     SAMPLED = "sampled"
     """A render for each pattern, with patches that Cycles samples as lights. No artist chooses this
     route: a capture takes it where light comes in by shadow rays alone."""
+    PHOTOGRAPHS = "photographs"
+    """No render: photographs of a real thing."""
 
 
 class Keep(StrEnum):

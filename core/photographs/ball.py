@@ -10,7 +10,7 @@ Examples
 [120, 90, 50]
 >>> picture[88:93, 134:139] = 9.0
 >>> [round(float(v), 2) for v in direction(picture, circle)]
-[0.63, 0.0, 0.78]
+[0.61, -0.0, 0.79]
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .description import Point
 # Pixels a side of the picture in which the ball is looked for.
 SMALL = 320
 # Of the circle's rim, so much must be an edge whose light changes towards the middle.
-RIM = 0.6
+RIM = 0.72
 # Radii that are looked for, as shares of the picture's shorter side.
 LEAST, MOST = 0.02, 0.5
 
@@ -55,7 +55,7 @@ def find(grey: NDArray) -> Point:
     log = np.log(np.maximum(small, 0) + 0.02 * float(np.percentile(small, 99)) + 1e-9)
     down, across = np.gradient(log)
     size = np.hypot(down, across)
-    strong = size > max(float(np.percentile(size, 80)), 1e-6)
+    strong = size > max(float(np.percentile(size, 90)), 1e-6)
     ys, xs = np.nonzero(strong)
     gx, gy = across[strong] / size[strong], down[strong] / size[strong]
     if len(ys) > 20000:
@@ -88,10 +88,11 @@ def find(grey: NDArray) -> Point:
 def _rim(x: NDArray, y: NDArray, gx: NDArray, gy: NDArray, radius: float) -> float:
     """The share of a circle that is an edge along it. x, y: the edges' places about the middle."""
     away = np.hypot(x, y)
-    on = np.abs(away - radius) < 1.0 + 0.02 * radius
-    along = np.abs(x[on] * gx[on] + y[on] * gy[on]) > 0.9 * away[on]
+    on = np.abs(away - radius) < 1.5
+    along = np.abs(x[on] * gx[on] + y[on] * gy[on]) > 0.93 * away[on]
     turn = np.arctan2(y[on], x[on])[along]
-    parts = min(64, max(12, int(4 * radius)))
+    # parts so short that edges by chance are in few of them
+    parts = max(12, int(2 * np.pi * radius / 3))
     met = np.unique(((turn / (2 * np.pi) + 0.5) * parts).astype(int) % parts)
     return len(met) / parts
 

@@ -115,9 +115,10 @@ def _read(said: Values) -> Description:
     said.whole("version", VERSION, VERSION)
     said.only("format", "version", *(f.name for f in fields(Description)))
     monitors = said.kind("monitors", dict)
-    white = said.kind("white", list) or said.kind("white", tuple)
+    white = said.data.get("white")
     if white is not None:
-        if len(white) != 4 or any(type(x) is not int or x < 0 for x in white) or 0 in white[2:]:
+        whole = isinstance(white, list | tuple) and all(type(x) is int and x >= 0 for x in white)
+        if not whole or len(white) != 4 or 0 in white[2:]:
             raise said.wrong("white", white)
         white = tuple(white)
     curve = said.data.get("curve")
