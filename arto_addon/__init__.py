@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from .blender import exr_library
 from .job import session
 from .live import live
 from .shot import scene_id, watch
@@ -63,6 +64,8 @@ _MODULES = (
 
 
 def register() -> None:
+    # first: without it no capture could be read, so nothing of ARTO is registered
+    exr_library.use_own()
     for cls in _CLASSES:
         bpy.utils.register_class(cls)
     for module in _MODULES:

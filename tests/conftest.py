@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from arto.core.exr import open_image_io
 from program_tools import MAKE_SCENE, Program, said
 
 from tools import package
+
+
+def own_modules() -> Path:
+    """The folder of what the module bpy brings for Python, found without loading bpy."""
+    (bpy,) = importlib.util.find_spec("bpy").submodule_search_locations
+    return next(Path(bpy).glob("*/python/lib/python*/site-packages"))
+
+
+# Every test that imports OpenImageIO has Blender's own.
+open_image_io.imported([own_modules()])
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -54,9 +54,12 @@ def header(scene: bpy.types.Scene) -> dict[str, object]:
 
 
 def time_code(text: str) -> TimeCode | None:
-    """The moment that Blender writes as `01:02:03:04`; None where an EXR has no such moment."""
+    """The moment that Blender writes as `01:02:03:04`; None where an EXR has no such moment.
+
+    An EXR counts 30 frames to a second.
+    """
     found = re.fullmatch(r"(\d\d):(\d\d):(\d\d):(\d\d)", text)
     moment = [int(part) for part in found.groups()] if found else [99]
-    if moment[0] > 23 or max(moment[1:]) > 59:
+    if moment[0] > 23 or max(moment[1:]) > 59 or moment[-1] > 29:
         return None
     return TimeCode(*moment)

@@ -79,14 +79,10 @@ class Layers:
         -------
         (H, W, C) array
 
-        Raises
-        ------
-        ExrError
-            The layer has no pixels, or channels of different sizes.
         """
         planes = self.planes(name)
         if into is None:
-            return self._filled(name, planes)
+            return _filled(planes)
         for n, pixels in enumerate(planes):
             into[..., n] = pixels
         return into
@@ -130,18 +126,13 @@ class Layers:
         Returns
         -------
         (H, W, C) array
-
-        Raises
-        ------
-        ExrError
-            As `read`.
         """
         planes = self.planes(name)
         if self._decoded:
             part, channels = self._layers[name]
             for channel in channels:
                 del self._decoded[part][channel]
-        return self._filled(name, planes)
+        return _filled(planes)
 
     def let_go(self, name: str) -> None:
         """Free the memory of a layer that is not needed for a while; it can be read again.
@@ -176,19 +167,14 @@ class Layers:
             found.append(np.ndarray(shape, dtype, self._data, at, strides))
         return found
 
-    def _filled(self, name: str, planes: list[NDArray]) -> NDArray:
-        if not all(isinstance(pixels, np.ndarray) for pixels in planes):  # else None
-            raise ExrError(f"{self.path} has no pixels in '{name}': make it again")
-        if len({pixels.shape for pixels in planes}) > 1:
-            raise ExrError(
-                f"{self.path} has channels of different sizes in '{name}': save it without "
-                "subsampling"
-            )
-        half = all(pixels.dtype == np.float16 for pixels in planes)
-        out = np.empty((*planes[0].shape, len(planes)), np.float16 if half else np.float32)
-        for n in reversed(range(len(planes))):
-            out[..., n] = planes.pop()  # frees the plane
-        return out
+
+def _filled(planes: list[NDArray]) -> NDArray:
+    """The planes as one (H, W, C) array; the list is emptied, so that each plane is freed."""
+    half = all(pixels.dtype == np.float16 for pixels in planes)
+    out = np.empty((*planes[0].shape, len(planes)), np.float16 if half else np.float32)
+    for n in reversed(range(len(planes))):
+        out[..., n] = planes.pop()
+    return out
 
 
 def _places(part: PlainPart) -> dict[str, tuple[np.dtype, int]]:

@@ -20,40 +20,42 @@ from numpy.typing import NDArray
 
 from ..errors import ExrError
 from ..regular import check_files_left
-from .layout import LayoutError, PlainPart
+from .attributes import decoded as value_of
+from .head import LayoutError, PartLayout
+from .layout import PlainPart
 from .layout import check as check_layout
 from .layout import plain as plain_parts
-from .library import openexr
+from .library import chosen
 from .window import place
 
 
-def library_parts(path: Path, header_only: bool) -> list[Any]:
-    """Open a file and give its parts as the OpenEXR library has them.
+def headers(path: Path) -> tuple[list[PartLayout], list[dict[str, Any]]]:
+    """Read the headers of a file, without its pixels.
 
     Parameters
     ----------
     path : Path
-    header_only : bool
-        Whether the pixels stay unread.
 
     Returns
     -------
-    list of OpenEXR.Part
+    parts : list of PartLayout
+    heads : list of dict
+        The attributes of each part by their names, see `attributes`.
 
     Raises
     ------
     ExrError
-        The file cannot be read, or a part of it cannot be decoded.
+        The file is missing, truncated or damaged.
     """
-    parts = check_complete(path)
-    try:
-        file = openexr().File(str(path), separate_channels=True, header_only=header_only)
-    except Exception as e:  # the wheel raises plain RuntimeErrors of many wordings
-        raise ExrError(f"{path} cannot be read ({e}): it is truncated or no EXR file") from e
-    # the library warns of a part that it cannot decode, and leaves it out
-    if len(file.parts) != parts:
-        raise ExrError(f"{path} has a damaged part: make it again")
-    return list(file.parts)
+    with _opened(path) as data, _telling(path):
+        parts = check_layout(data)
+        return parts, [
+            {
+                name.decode("utf-8", "replace"): value_of(kind, value)
+                for name, (kind, value) in part.attributes.items()
+            }
+            for part in parts
+        ]
 
 
 def decoded(path: Path) -> tuple[list[dict[str, Any]], list[dict[str, NDArray]]]:
@@ -75,11 +77,14 @@ def decoded(path: Path) -> tuple[list[dict[str, Any]], list[dict[str, NDArray]]]
     ExrError
         The file cannot be read.
     """
-    heads, channels = [], []
-    for part in library_parts(path, header_only=False):
-        heads.append(dict(part.header))
-        channels.append({name: channel.pixels for name, channel in part.channels.items()})
-        part.channels.clear()  # otherwise the part would keep layers that `Layers.take` frees
+    parts, heads = headers(path)
+    if any(part.sampled for part in parts):
+        raise ExrError(f"{path} has channels of different sizes: save it without subsampling")
+    channels = chosen().decode(path, parts)
+    for part, found in zip(parts, channels, strict=True):
+        shape = part.height, part.width
+        if any(n not in found or found[n].shape != shape for n, _ in part.channels):
+            raise ExrError(f"{path} has a damaged part: make it again")
     try:
         place(heads, channels)
     except ExrError as e:
@@ -87,17 +92,12 @@ def decoded(path: Path) -> tuple[list[dict[str, Any]], list[dict[str, NDArray]]]
     return heads, channels
 
 
-def check_complete(path: Path) -> int:
+def check_complete(path: Path) -> None:
     """Check that all of a file is there.
 
     Parameters
     ----------
     path : Path
-
-    Returns
-    -------
-    int
-        The number of its parts.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def check_complete(path: Path) -> int:
         The file is missing, truncated or damaged.
     """
     with _opened(path) as data, _telling(path):
-        return check_layout(data)
+        check_layout(data)
 
 
 def mapped(path: Path) -> tuple[mmap.mmap, list[PlainPart] | None]:

@@ -27,8 +27,8 @@ from typing import Any
 from numpy.typing import NDArray
 
 from .layers import Layers, layers_of
-from .opening import decoded, library_parts
-from .window import Box, box_of
+from .opening import decoded, headers
+from .window import Box
 
 
 def whole_parts(path: Path) -> list[tuple[dict[str, Any], dict[str, NDArray]]]:
@@ -66,8 +66,9 @@ def part_names(path: Path) -> list[str]:
     ExrError
         The file cannot be read.
     """
-    found = [p.header for p in library_parts(path, header_only=True)]
-    return list(layers_of(path, [(h, [c.name for c in h["channels"]]) for h in found]))
+    parts, heads = headers(path)
+    names = [[name for name, _ in part.channels] for part in parts]
+    return list(layers_of(path, list(zip(heads, names, strict=True))))
 
 
 def header(path: Path) -> dict[str, Any]:
@@ -86,7 +87,7 @@ def header(path: Path) -> dict[str, Any]:
     ExrError
         The file cannot be read.
     """
-    return dict(library_parts(path, header_only=True)[0].header)
+    return headers(path)[1][0]
 
 
 def windows(path: Path) -> tuple[Box, Box]:
@@ -107,7 +108,7 @@ def windows(path: Path) -> tuple[Box, Box]:
         The file cannot be read.
     """
     head = header(path)
-    return box_of(head["dataWindow"]), box_of(head["displayWindow"])
+    return head["dataWindow"], head["displayWindow"]
 
 
 def read(path: Path) -> dict[str, NDArray]:

@@ -10,7 +10,7 @@ Examples
 >>> plane = np.zeros((6, 8), np.float32)
 >>> plane[2, 3] = 1.0
 >>> parts, head = Window(overscan=1, crop=True).put([("", {"Y": plane})])
->>> parts[0][1]["Y"].shape, box_of(head["displayWindow"]), box_of(head["dataWindow"])
+>>> parts[0][1]["Y"].shape, head["displayWindow"], head["dataWindow"]
 ((1, 1), (0, 0, 5, 3), (2, 1, 2, 1))
 
 Source
@@ -114,9 +114,9 @@ class Window:
             for name, channels in parts
         ]
         return found, {
-            "displayWindow": _written((0, 0, width - 2 * n - 1, height - 2 * n - 1)),
-            "dataWindow": _written((x0 - n, y0 - n, x1 - n, y1 - n)),
-            PICTURE: _written((-n, -n, width - n - 1, height - n - 1)),
+            "displayWindow": (0, 0, width - 2 * n - 1, height - 2 * n - 1),
+            "dataWindow": (x0 - n, y0 - n, x1 - n, y1 - n),
+            PICTURE: (-n, -n, width - n - 1, height - n - 1),
         }
 
 
@@ -144,11 +144,6 @@ def _something(planes: Sequence[tuple[str, NDArray]], overscan: int) -> tuple[in
     return int(y[0]), int(y[-1]), int(x[0]), int(x[-1])
 
 
-def _written(box: Box) -> tuple[NDArray, NDArray]:
-    """A box as the OpenEXR library has it."""
-    return np.array(box[:2], np.int32), np.array(box[2:], np.int32)
-
-
 def place(heads: Sequence[dict[str, Any]], parts: Sequence[dict[str, NDArray]]) -> None:
     """Put the channels of each part of a file into the whole picture, in place.
 
@@ -167,9 +162,9 @@ def place(heads: Sequence[dict[str, Any]], parts: Sequence[dict[str, NDArray]]) 
     ExrError
         The windows are those of a damaged header.
     """
-    data = [box_of(head["dataWindow"]) for head in heads]
-    others = [box_of(head[PICTURE]) for head in heads if PICTURE in head]
-    whole = _around([*data, *others, *(box_of(head["displayWindow"]) for head in heads)])
+    data = [head["dataWindow"] for head in heads]
+    others = [head[PICTURE] for head in heads if PICTURE in head]
+    whole = _around([*data, *others, *(head["displayWindow"] for head in heads)])
     width, height = whole[2] - whole[0] + 1, whole[3] - whole[1] + 1
     if width * height > _MOST_PIXELS and any(box != whole for box in data):
         raise ExrError(f"its windows make a picture of {width}x{height} pixels")
@@ -178,28 +173,10 @@ def place(heads: Sequence[dict[str, Any]], parts: Sequence[dict[str, NDArray]]) 
             continue
         y, x = box[1] - whole[1], box[0] - whole[0]
         there = slice(y, y + box[3] - box[1] + 1), slice(x, x + box[2] - box[0] + 1)
-        shape = box[3] - box[1] + 1, box[2] - box[0] + 1
         for name, pixels in channels.items():
-            if isinstance(pixels, np.ndarray) and pixels.shape == shape:  # else None
-                out = np.zeros((height, width), pixels.dtype)
-                out[there] = pixels
-                channels[name] = out
-
-
-def box_of(found: Any) -> Box:
-    """Turn a box of the OpenEXR library into a tuple.
-
-    Parameters
-    ----------
-    found : pair of pairs of int
-
-    Returns
-    -------
-    Box
-        x0, y0, x1, y1, the last two included.
-    """
-    (x0, y0), (x1, y1) = (tuple(int(v) for v in corner) for corner in found)
-    return x0, y0, x1, y1
+            out = np.zeros((height, width), pixels.dtype)
+            out[there] = pixels
+            channels[name] = out
 
 
 def _around(boxes: Sequence[Box]) -> Box:

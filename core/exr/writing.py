@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +27,10 @@ from numpy.typing import NDArray
 
 from ..errors import ExrError
 from ..files import whole
-from .library import openexr
+from .attributes import encoded_head
+from .head import LayoutError
+from .layout import put_heads
+from .library import chosen
 from .opening import check_complete
 from .window import FULL, Window
 
@@ -48,22 +50,6 @@ COLOUR_SPACES = {
 COMPRESSIONS = ("ZIPS", "ZIP", "DWAA")
 # The largest number that a half float holds.
 HALF = 65504.0
-
-
-@dataclass(frozen=True)
-class TimeCode:
-    """A moment of an edit.
-
-    Parameters
-    ----------
-    hours, minutes, seconds, frame : int
-        Up to 23, 59, 59 and 59.
-    """
-
-    hours: int
-    minutes: int
-    seconds: int
-    frame: int
 
 
 def as_half(*pictures: NDArray) -> list[NDArray]:
@@ -245,40 +231,34 @@ def _write(
     compression: str,
     colours: Mapping[str, str] | None = None,
 ) -> None:
-    exr = openexr()
-    common = {
-        "compression": getattr(exr, f"{compression}_COMPRESSION"),
-        "type": exr.scanlineimage,
-        **{name: _attribute(value) for name, value in (attributes or {}).items()},
-    }
-    if window != FULL:
-        parts, windows = window.put(parts)
-        common = windows | common
-    made = []
-    for name, channels in parts:
+    if len({plane.shape for _, planes in parts for plane in planes.values()}) > 1:
+        raise ExrError(f"{path} was not written: its layers have different sizes")
+    parts, windows = window.put(parts)
+    height, width = next(iter(parts[0][1].values())).shape
+    whole_box = 0, 0, width - 1, height - 1
+    common = {"displayWindow": whole_box, **windows, **(attributes or {})}
+    heads = []
+    for number, (name, _) in enumerate(parts):
         space = (colours or {}).get(name, colour_space)
         head = {"colorSpace": space}
         if space in COLOUR_SPACES:
             head["colorInteropID"] = COLOUR_SPACES[space]
-        made.append(exr.Part(head | common, channels, name))
+        # the parts of a file of several have names
+        named = name or (f"Part{number}" if len(parts) > 1 else "")
+        heads.append(encoded_head(head | common, named))
     try:
         with opener(path) as partial:
-            exr.File(made).write(str(partial))
-            # the library says nothing when the last bytes find no room
+            chosen().encode(
+                partial, [p for _, p in parts], windows.get("dataWindow", whole_box), compression
+            )
+            # a library says nothing when the last bytes find no room
             try:
+                put_heads(partial, heads, compression)
                 check_complete(partial)
-            except ExrError:
-                raise OSError("it came out incomplete") from None
+            except (ExrError, LayoutError) as e:
+                raise OSError(f"it came out incomplete, {e}") from None
     except (OSError, RuntimeError) as e:
         raise ExrError(
             f"{path} cannot be written ({e}): make room on the disk, or choose a folder that "
             "can be written"
         ) from e
-
-
-def _attribute(value: Any) -> Any:
-    """An attribute of a header, as the library has it; it takes a Fraction as it is."""
-    if isinstance(value, TimeCode):
-        moment = value.hours, value.minutes, value.seconds, value.frame
-        return openexr().TimeCode(*moment, *[False] * 6, *[0] * 8)
-    return value

@@ -208,7 +208,8 @@ def test_a_world_of_layers_is_no_damaged_world(tmp_path):
     ("text", "moment"),
     [
         ("01:02:03:04", TimeCode(1, 2, 3, 4)),
-        ("23:59:59:59", TimeCode(23, 59, 59, 59)),
+        ("23:59:59:29", TimeCode(23, 59, 59, 29)),
+        ("23:59:59:30", None),  # of 60 frames a second
         ("24:00:00:00", None),
         ("-00:00:01:00", None),
         ("00:00:00:75", None),

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import OpenImageIO
 import pytest
 from arto.core import exr
 from arto.core.capture import capture_set, names
@@ -265,6 +266,15 @@ arrays_of = _helper(_arrays_of)
 put_arrays = _helper(_put_arrays)
 used = _helper(_used)
 refused = _helper(_refused)
+
+
+@pytest.fixture(params=["OpenEXR", "OpenImageIO"])
+def library(request: pytest.FixtureRequest) -> Iterator[str]:
+    """Which library packs and unpacks the pixels of EXR files."""
+    before = exr.chosen()
+    exr.choose(exr.OpenImageIo(OpenImageIO) if request.param == "OpenImageIO" else exr.OpenExr())
+    yield request.param
+    exr.choose(before)
 
 
 @pytest.fixture

@@ -12,6 +12,8 @@ from arto.core import exr, files
 from arto.core.errors import ExrError
 from exr_tools import layers, same
 
+pytestmark = pytest.mark.usefixtures("library")
+
 
 def test_float_comes_back_to_the_bit(tmp_path: Path) -> None:
     given = layers()

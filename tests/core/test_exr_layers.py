@@ -12,6 +12,8 @@ from arto.core import exr
 from arto.core.errors import ExrError
 from exr_tools import layers, same
 
+pytestmark = pytest.mark.usefixtures("library")
+
 
 def one_part(path: Path, planes: dict[str, np.ndarray]) -> None:
     head = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}

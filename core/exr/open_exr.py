@@ -1,0 +1,102 @@
+"""The package OpenEXR, for Python without Blender; no other module imports it.
+
+Examples
+--------
+>>> OpenExr().name
+'OpenEXR'
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ExrError
+from .head import PartLayout
+from .window import Box
+
+
+class OpenExr:
+    """The package OpenEXR as a `library.Library`, imported when it is first needed."""
+
+    name = "OpenEXR"
+
+    def decode(self, path: Path, parts: Sequence[PartLayout]) -> list[dict[str, NDArray]]:
+        """Read all pixels of a file.
+
+        Parameters
+        ----------
+        path : Path
+        parts : sequence of PartLayout
+
+        Returns
+        -------
+        list of dict of str to (H, W) array
+
+        Raises
+        ------
+        ExrError
+            Pixels cannot be decoded, or the package is missing.
+        """
+        package = _package()
+        try:
+            file = package.File(str(path), separate_channels=True)
+        except Exception as e:  # the package raises plain RuntimeErrors of many wordings
+            raise ExrError(f"{path} cannot be read ({e}): it is truncated or no EXR file") from e
+        # the package warns of a part that it cannot decode, and leaves it out
+        if len(file.parts) != len(parts):
+            raise ExrError(f"{path} has a damaged part: make it again")
+        found = []
+        for part in file.parts:
+            found.append({name: channel.pixels for name, channel in part.channels.items()})
+            part.channels.clear()  # otherwise the part would keep planes that are let go
+        return found
+
+    def encode(
+        self, path: Path, parts: Sequence[dict[str, NDArray]], box: Box, compression: str
+    ) -> None:
+        """Write a file that has the pixels.
+
+        Parameters
+        ----------
+        path : Path
+        parts : sequence of dict of str to (H, W) array
+        box : Box
+        compression : str
+
+        Raises
+        ------
+        OSError, RuntimeError
+            The file cannot be written.
+        ExrError
+            The package is missing.
+        """
+        package = _package()
+        packing = getattr(package, f"{compression}_COMPRESSION", None)
+        if packing is None:
+            raise OSError(f"this OpenEXR stores no pixels as {compression}")
+        corners = np.array(box[:2], np.int32), np.array(box[2:], np.int32)
+        head = {
+            "compression": packing,
+            "type": package.scanlineimage,
+            "dataWindow": corners,
+            "displayWindow": corners,
+        }
+        made = [package.Part(dict(head), part, f"part{n}") for n, part in enumerate(parts)]
+        package.File(made).write(str(path))
+
+
+def _package() -> Any:
+    """The package. Raises ExrError where it is not installed."""
+    try:
+        import OpenEXR
+    except ImportError as e:
+        raise ExrError(
+            "EXR files need the package OpenEXR for Python: install it (pip install OpenEXR), or "
+            "inside Blender choose Blender's own OpenImageIO (arto.core.exr.choose)"
+        ) from e
+    return OpenEXR
