@@ -39,7 +39,7 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Program]:
         )
     home = tmp_path_factory.mktemp("blender")
     out = Program(home)
-    zipped = package.build(only_here=True)
+    zipped = package.build()
     install = ("--command", "extension", "install-file", "-r", "user_default", "--enable", zipped)
     done = out.run(*install)
     assert 'Installed "arto"' in done.stdout, said(done)

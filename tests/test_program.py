@@ -63,12 +63,20 @@ def check_quiet(done: subprocess.CompletedProcess[str]) -> None:
 
 
 def test_batch_line(program: Program, scene: Path, reference: np.ndarray) -> None:
+    """Nothing is written beside the extension's code."""
+    code = program.home / "extensions" / "user_default" / "arto"
+
+    def files() -> set[Path]:
+        return {p for p in code.rglob("*") if p.is_file() and p.suffix != ".pyc"}
+
+    before = files()
     done = program.run("-b", scene, "--python-exit-code", "1", "--python-expr", BATCH)
     assert done.returncode == 0, said(done)
     check_quiet(done)
     for job in ("capture", "fit", "relight"):
         assert re.search(rf"^ARTO {job}: 100%", done.stdout, re.MULTILINE), said(done)
     check_picture(relit(scene.parent), reference)
+    assert before and files() == before
 
 
 def test_command(program: Program, scene: Path, reference: np.ndarray) -> None:

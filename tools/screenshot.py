@@ -164,7 +164,7 @@ def main() -> int:
     width, height = SCREEN
     display = ["xvfb-run", "-a", "-s", f"-screen 0 {width}x{height}x24"]
     display += ["bash", "-c", PHOTOGRAPH, "-"]
-    zipped = package.build(only_here=True)
+    zipped = package.build()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         environment = {**os.environ, "BLENDER_USER_RESOURCES": str(folder / "user")}

@@ -98,7 +98,7 @@ def decoded(kind: bytes, data: bytes) -> Any:
             return data.decode("utf-8", "surrogateescape")
         if kind in _NUMBERS:
             found = struct.unpack(f"<{_NUMBERS[kind]}", data)
-            return found if len(found) > 1 else found[0]
+            return found[0] if _NUMBERS[kind] in "ifd" else found
         if kind == b"rational":
             above, below = struct.unpack("<iI", data)
             return Fraction(above, below) if below else Raw(kind, data)

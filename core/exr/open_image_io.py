@@ -55,8 +55,8 @@ def imported(folders: Sequence[Path]) -> ModuleType:
     ExrError
         There is none; the message names the packages that bring it.
     """
-    if _MODULE in sys.modules:  # a second copy of it in a process could not be loaded
-        return sys.modules[_MODULE]
+    if there := sys.modules.get(_MODULE):  # a process cannot load a second copy of it
+        return there
     spec = importlib.machinery.PathFinder.find_spec(_MODULE, [str(f) for f in folders])
     spec = spec or importlib.util.find_spec(_MODULE)
     if spec is None or spec.loader is None:
