@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from . import heavy_command, match_command, mirrors_command, place_command
+from . import first, heavy_command, match_command, mirrors_command, place_command
 
 
 def _demo(options: argparse.Namespace) -> None:
@@ -293,6 +293,7 @@ def main() -> int:
     c.set_defaults(run=_accuracy)
 
     mirrors_command.add(commands)
+    first.add(commands)
     heavy_command.add(commands)
     place_command.add(commands)
 

@@ -283,16 +283,19 @@ def _in_halves(folder: Path, head: CaptureHead, number: int) -> CaptureHead | No
 
 
 def render_tile(
-    on: Stage, head: CaptureHead, number: int, folder: Path, around: Around
+    on: Stage, head: CaptureHead, number: int, folder: Path, around: Around, stretch: str = ""
 ) -> Steps[list[str]]:
-    """Render the missing files of a tile into a folder -> the names of all its files."""
+    """Render the missing files of a tile into a folder -> the names of all its files.
+
+    stretch: what the names have beside the number of the tile.
+    """
     plan, tiles = plan_of(head), len(head.tiles)
     total = len(plan) * tiles
     files = []
     for i, images in enumerate(plan):
         at = number * len(plan) + i
         text = f"render {at + 1} of {total}: {len(images)} basis images"
-        name = f"tile_{number:04d}.exr" if len(plan) == 1 else f"tile_{number:04d}_{i:04d}.exr"
+        name = f"tile_{number:04d}{stretch}" + (f"_{i:04d}.exr" if len(plan) > 1 else ".exr")
         # a killed process may have finished the file without noting it down
         if not is_whole(folder / name, images):
             around.set_tile(head, number, images)

@@ -15,7 +15,6 @@ import bpy
 
 from ...core import marked
 from ...core.capture.capture_set import CaptureSet
-from ...core.capture.head import CaptureHead
 from ...core.capture.tile_entry import sums_of
 from ...core.errors import FarmError
 from ...core.files import replace_folder, whole
@@ -28,6 +27,7 @@ from ..capture.asked import Asked, asked
 from ..capture.capture import render_tile
 from ..capture.check import check_scene
 from ..capture.planned import Given
+from ..capture.same import differences
 from ..capture.stream import Stream
 from ..work import Progress, Steps, Wrote, retold
 from .head import Part, PartHead, write_part
@@ -158,7 +158,7 @@ def _on_stage(job: Job, part: Part, captured: CaptureSet) -> Iterator[Asked]:
         job.go_to(scene, part.frame)
         check_scene(scene, view_layer)
         with asked(scene, view_layer, given, part.take) as this:
-            changed = _differences(this, replace(head, samples=samples))
+            changed = differences(this, replace(head, samples=samples))
             if changed:
                 raise FarmError(
                     f"this is not the scene that was planned ({'; '.join(changed[:3])}): give "
@@ -174,34 +174,6 @@ def _on_stage(job: Job, part: Part, captured: CaptureSet) -> Iterator[Asked]:
                 cycles.sample_offset = part.seed * samples
                 cycles.samples = job.head.seeds * samples
             yield this
-
-
-def _differences(this: Asked, head: CaptureHead) -> list[str]:
-    """What has changed in the scene since the plan, in words."""
-    if head.shot is None:
-        return ["it has no shot"]
-    here = this.head
-    out = [
-        f"{name}: {now}, not {then}"
-        for name, now, then in (
-            ("samples", here.samples, head.samples),
-            ("seed", here.seed, head.seed),
-            ("adaptive", here.adaptive, head.adaptive),
-            ("far", here.far, head.far),
-            ("blender", here.blender, head.blender),
-            ("colour space", here.colour_space, head.colour_space),
-            ("catchers", here.catchers, head.catchers),
-        )
-        if now != then
-    ]
-    planned = head.fingerprint or {}
-    for thing in sorted(planned.keys() | this.found.keys()):
-        if planned.get(thing) != this.found.get(thing):
-            out.append(f"{thing} is another")
-    for name in ("camera_matrix", "lens", "frame", "subframe", "width", "height"):
-        if getattr(this.shot, name) != getattr(head.shot, name):
-            out.append(f"the shot's {name.replace('_', ' ')} is another")
-    return out
 
 
 def _fitted(captured: CaptureSet, part: Part, folder: Path, files: list[str]) -> Steps[dict]:

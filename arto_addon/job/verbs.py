@@ -10,6 +10,7 @@ from typing import Literal
 import bpy
 
 from ..capture.capture import capture
+from ..capture.more import more_samples
 from ..capture.sequence import capture_frames
 from ..fit.fit import fit
 from ..match.match import even_out, match_target
@@ -19,6 +20,7 @@ from ..relight.looks import relight_looks
 from ..relight.many import frames_of, relight_many
 from ..relight.relight import compute
 from ..shoot import shoot
+from ..stage.settings import samples_of
 from ..work import Steps
 
 Verb = Literal[
@@ -28,6 +30,7 @@ Verb = Literal[
     "capture_frames",
     "relight_frames",
     "shoot",
+    "more_samples",
     "relight_looks",
     "verify",
     "composite",
@@ -70,6 +73,10 @@ def _capture(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
     return capture(scene, view_layer, shows=True)
 
 
+def _more_samples(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
+    return more_samples(scene, view_layer, samples_of(scene))
+
+
 def _shoot(scene: bpy.types.Scene, view_layer: str) -> Steps[Path | None]:
     return shoot(scene, view_layer, shows=True)
 
@@ -81,6 +88,7 @@ VERBS: Mapping[Verb, Work] = {
     "capture_frames": Work(_capture_frames, "capturing the frames of", captures=True),
     "relight_frames": Work(_relight_frames, "relighting the frames of"),
     "shoot": Work(_shoot, "capturing", captures=True),
+    "more_samples": Work(_more_samples, "adding samples to", captures=True),
     "relight_looks": Work(_relight_looks, "relighting the looks of"),
     "verify": Work(verify_plate, "verifying the plate of"),
     "composite": Work(save_composite, "compositing"),

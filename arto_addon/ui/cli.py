@@ -21,6 +21,7 @@ from ...core.errors import ArtoError, SceneError
 from ...core.files import write_text
 from ..blender.front import to_front
 from ..capture.capture import capture, estimate
+from ..capture.more import more_of_frames, more_samples
 from ..capture.sequence import capture_frames
 from ..farm.gather import gather
 from ..farm.part import render_part, save_part
@@ -122,6 +123,7 @@ def _do(verb: str, options: dict[str, Any], report: Report) -> None:
     planned = {name: options.pop(name, None) for name in ("job", "tiles", "seeds")}
     worlds, turns = options.pop("worlds", None), options.pop("turntable", 1)
     kit = options.pop("kit", None)
+    more = options.pop("more_samples", None)
     _set(scene, options)
     if kit is not None:
         give(scene, layer, kit.resolve())
@@ -137,6 +139,10 @@ def _do(verb: str, options: dict[str, Any], report: Report) -> None:
     if verb == "plan":
         folder = planned["job"].resolve()
         work = plan(scene, layer, folder, frames, planned["tiles"], planned["seeds"])
+    elif verb == "capture" and more and frames:
+        work = more_of_frames(scene, layer, more, frames, batch)
+    elif verb == "capture" and more:
+        work = more_samples(scene, layer, more)
     elif verb == "capture" and frames:
         work = capture_frames(scene, layer, frames, batch)
     elif verb == "relight" and frames and not worlds and turns == 1:

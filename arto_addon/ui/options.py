@@ -52,6 +52,12 @@ def parser() -> argparse.ArgumentParser:
                         "or a picture)")  # fmt: skip
         if name == "capture":
             one.add_argument(
+                "--more-samples",
+                type=_from_one,
+                metavar="N",
+                help="add so many samples to the capture that is there, and fit it anew",
+            )
+            one.add_argument(
                 "--estimate",
                 action="store_true",
                 help="say what it takes, as JSON in the last line, and render nothing long",

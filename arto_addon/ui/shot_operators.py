@@ -10,13 +10,17 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
-from ...core.errors import SceneError
+from ...core.capture.head import HEADER
+from ...core.errors import ArtoError, SceneError
 from ...core.files import Lock
+from ..capture.check import check_scene
+from ..capture.more import can_have_more, more_samples
 from ..relight import looks
 from ..relight.looks import show_looks
 from ..shoot import shoot_and_show
-from ..shot import paths
+from ..shot import paths, status
 from ..shot.shot import layer_of
+from ..stage.settings import samples_of
 from ..stage.stage import picture_size
 from ..stage.takes import TAKES, WHOLE
 from ..work import Steps
@@ -51,6 +55,41 @@ class ARTO_OT_shoot(LongWork):
 
     def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps[object]:
         return shoot_and_show(scene, view_layer)
+
+
+class ARTO_OT_more_samples(LongWork):
+    """Add as many samples as are set to the capture that is there, in place of a new one"""
+
+    bl_idname = "arto.more_samples"
+    bl_label = "More Samples"
+    verb = "more_samples"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not can_capture(cls, context):
+            return False
+        try:
+            _can_have_more(context.scene)
+        except ArtoError as e:
+            cls.poll_message_set(f"{e}"[:1].upper() + f"{e}"[1:])
+            return False
+        return True
+
+    def check(self, scene: bpy.types.Scene) -> None:
+        check_scene(scene)
+        _can_have_more(scene)
+
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps[object]:
+        return more_samples(scene, view_layer, samples_of(scene))
+
+
+def _can_have_more(scene: bpy.types.Scene) -> None:
+    """Raise an ArtoError where no samples can be added to the scene's capture."""
+    place = paths.place(scene, layer_of(scene), fresh=bpy.app.background)
+    there = status.capture_at(place.readable / "capture" / HEADER)
+    if there is None:
+        raise SceneError("capture the shot first")
+    can_have_more(there)
 
 
 class ARTO_OT_set_back(Quick):
@@ -189,6 +228,7 @@ class ARTO_OT_open_guide(Quick):
 
 CLASSES = (
     ARTO_OT_shoot,
+    ARTO_OT_more_samples,
     ARTO_OT_set_back,
     ARTO_OT_delete_capture,
     ARTO_OT_open_hdri,

@@ -84,7 +84,10 @@ def _buttons(column: bpy.types.UILayout, context: bpy.types.Context, found: stat
         big.operator(beside)
     if found.stopped:
         big.operator("arto.discard_unfinished", text="", icon="TRASH")
-    if not ended(column, context, ("capture", "shoot", "fit", "capture_frames")):
+    if found.kind == "ready" and not found.goes_on:
+        column.operator("arto.more_samples", icon="ADD")
+    works: tuple[Verb, ...] = ("capture", "shoot", "fit", "capture_frames", "more_samples")
+    if not ended(column, context, works):
         lines = state.price(scene, found.goes_on) if found.kind != "blocked" else ()
         slot(column, context, "\n".join(lines))
 

@@ -68,6 +68,7 @@ Mix to Scene | Mischung in die Szene | ミックスをシーンへ
 Live | Live | ライブ
 Show Patches | Lichtfelder zeigen | パッチを表示
 Finish When Resting | In Ruhe fertigstellen | 静止時に仕上げる
+More Samples | Mehr Samples | サンプルを追加
 Show Captures | Aufnahmen zeigen | キャプチャを表示
 From a draft of {w} x {h}; the capture has begun | Aus einem Entwurf von {w} x {h}; die Aufnahme hat begonnen | {w} x {h} の下書きから。キャプチャが始まりました
 From a draft of {w} x {h}; the capture is at tile {at} of {tiles} | Aus einem Entwurf von {w} x {h}; die Aufnahme ist bei Kachel {at} von {tiles} | {w} x {h} の下書きから。キャプチャはタイル {at} / {tiles}

@@ -165,6 +165,7 @@ _FINISHERS: dict[Verb, Callable[[SecondBlender], str]] = {
     "relight_looks": show_looks,
     "capture": show_captured,
     "shoot": show_captured,
+    "more_samples": show_captured,
     "fit": show_captured,
     "verify": show_verified,
     "match": show_matched,
