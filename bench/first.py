@@ -123,7 +123,7 @@ def first(
                 )
 
         install = ("--command", "extension", "install-file", "-r", "user_default", "--enable")
-        run(*blender, *install, package.build(only_here=True))
+        run(*blender, *install, package.build())
         (folder / "make.py").write_text(MAKE)
         (folder / "click.py").write_text(CLICK)
         for i, (scene, size) in enumerate((s, size) for s in scenes for size in sizes):
