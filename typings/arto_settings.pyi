@@ -69,6 +69,7 @@ class Settings:
     match_balance: bool
     folder: str
     scene_id: str
+    photographs: str
     alone: str
     bl_rna: Any
     def is_property_set(self, name: str) -> bool: ...

@@ -89,6 +89,11 @@ def check_scene(scene: bpy.types.Scene, view_layer: str | None = None) -> None:
 
     Objects are checked later, on the stage (`stage.bounds.Rendered.check`).
     """
+    if scene.arto.photographs:
+        raise SceneError(
+            f"the scene '{scene.name}' is of photographs, which cannot be captured: Open "
+            "Photographs reads them"
+        )
     if scene.render.engine != "CYCLES":
         raise SceneError(
             f"the render engine is {scene.render.engine}: ARTO captures with Cycles; choose it in "

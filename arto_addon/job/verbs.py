@@ -14,6 +14,7 @@ from ..capture.more import more_samples
 from ..capture.sequence import capture_frames
 from ..fit.fit import fit
 from ..match.match import even_out, match_target
+from ..photographs.read import read_and_relight
 from ..plate.composite import save_composite
 from ..plate.verify import verify_plate
 from ..relight.looks import relight_looks
@@ -36,6 +37,7 @@ Verb = Literal[
     "composite",
     "match",
     "even_out",
+    "photographs",
 ]
 
 
@@ -93,5 +95,6 @@ VERBS: Mapping[Verb, Work] = {
     "verify": Work(verify_plate, "verifying the plate of"),
     "composite": Work(save_composite, "compositing"),
     "match": Work(match_target, "looking for the light of"),
+    "photographs": Work(read_and_relight, "reading the photographs of", captures=True),
     "even_out": Work(even_out, "looking for even light on"),
 }

@@ -40,6 +40,11 @@ def verify_plate(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps
     size differs from a render's, or where pixels are not finite; CancelledError.
     """
     layer = view_layer or layer_of(scene)
+    if scene.arto.photographs:
+        raise SceneError(
+            f"the scene '{scene.name}' is of photographs, and cannot be rendered: held_out.txt in "
+            "the shot's folder says how well the lamps are predicted"
+        )
     path = relit_file(scene)
     if not path.is_file():
         raise SceneError(f"there is no plate {path} to verify: press Relight first")

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.capture.kinds import Route
 from ...core.catcher import Caught, catch_seen, of_ground
 from ...core.errors import FieldError
 from ...core.field.field import Field
@@ -250,7 +251,9 @@ def _lamps(shown: Shown, found: Split) -> Steps[tuple[list[NDArray[np.float32]],
     settings, about = shown.scene.arto, shown.field.about
     if not settings.lamps or not found.worth:
         return [], "no", False
-    if about.far is False:
+    if about.route == Route.PHOTOGRAPHS:
+        lamps = "no: a photographed thing cannot be rendered; suns shine by the patches they are in"
+    elif about.far is False:
         lamps = "no: lamps at infinity would not stand where a near hemicube has them"
     elif about.view_layer is None:
         lamps = "no: the field does not say of which view layer it is; capture again"

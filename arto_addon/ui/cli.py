@@ -35,7 +35,7 @@ from ..relight.relight import relight
 from ..shot import home, paths, scene_id
 from ..shot.adopting import adopt, adopt_from
 from ..work import Batch, ProgressLines, Steps, run, strictly
-from . import cli_photograph
+from . import cli_photograph, cli_photographs
 from .cli_light import give, light
 from .inventory import FORMAT, Inventory, inventory
 from .options import EVERY_FRAME, parser
@@ -105,6 +105,9 @@ def _do(verb: str, options: dict[str, Any], report: Report) -> None:
     batch = Batch(options.pop("keep_going", False), options.pop("strict", False))
     if verb in ("part", "gather"):
         _of_a_farm(verb, options, report, batch)
+        return
+    if verb == "photographs":
+        cli_photographs.work(options, report, batch)
         return
     scene, layer = _scene(options)
     if verb == "match":

@@ -120,6 +120,9 @@ class ARTO_OT_remove_hemicube(Quick):
 
 
 def can_capture(cls: type, context: bpy.types.Context) -> bool:
+    if context.scene.arto.photographs:
+        cls.poll_message_set("This scene is of photographs: Read Again reads them")
+        return False
     if context.scene.render.engine != "CYCLES":
         cls.poll_message_set("ARTO captures with Cycles: choose it as the render engine")
         return False

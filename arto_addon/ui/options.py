@@ -11,7 +11,7 @@ from ...core.file_names import is_text
 from ..blender.devices import KINDS
 from ..settings import table
 from ..settings.setting import Setting
-from . import cli_photograph
+from . import cli_photograph, cli_photographs
 
 # What stands for all frames that a capture was begun of.
 EVERY_FRAME = range(0)
@@ -92,6 +92,10 @@ def parser() -> argparse.ArgumentParser:
                 default=1,
                 help="renders of each, whose light is averaged",
             )
+    cli_photographs.add(
+        jobs.add_parser("photographs", parents=[files, told], help="open a lab's photographs"),
+        _path,
+    )
     cli_photograph.add(
         jobs.add_parser("photograph", parents=[files, told], help="photograph the scene as a lab"),
         _path,

@@ -74,6 +74,12 @@ differs from them by more than their noise"""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
+        if context.scene.arto.photographs:
+            cls.poll_message_set(
+                "A photographed thing cannot be rendered. The other lamps predict each lamp: see "
+                "held_out.txt in the shot's folder"
+            )
+            return False
         return free(cls) and _has_plate(cls, context)
 
     def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps[object]:

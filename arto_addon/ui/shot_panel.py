@@ -65,8 +65,22 @@ class ShotPanel(Draws):
                 say(column, context, text, "INFO")
 
 
+def _of_photographs(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw what a scene of photographs has in the place of a capture's buttons."""
+    column.separator(factor=0.5)
+    big = column.row(align=True)
+    big.scale_y = 1.6
+    big.operator("arto.read_photographs", icon="FILE_REFRESH")
+    big.operator("arto.open_photographs", text="", icon="FILE_FOLDER")
+    if not ended(column, context, ("photographs",)):
+        slot(column, context, context.scene.arto.photographs)
+
+
 def _buttons(column: bpy.types.UILayout, context: bpy.types.Context, found: state.Told) -> None:
     scene = context.scene
+    if scene.arto.photographs:
+        _of_photographs(column, context)
+        return
     column.separator(factor=0.5)
     row = column.row(align=True)
     row.prop(scene.arto, "quality", text="")
@@ -90,6 +104,7 @@ def _buttons(column: bpy.types.UILayout, context: bpy.types.Context, found: stat
     if not ended(column, context, works):
         lines = state.price(scene, found.goes_on) if found.kind != "blocked" else ()
         slot(column, context, "\n".join(lines))
+    column.operator("arto.open_photographs", icon="FILE_FOLDER")
 
 
 def running(column: bpy.types.UILayout, context: bpy.types.Context, job: SecondBlender) -> None:

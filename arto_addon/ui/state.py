@@ -63,6 +63,8 @@ def told(scene: bpy.types.Scene) -> Told:
         return Told("blocked", ("This file was never saved:", "save it first"), "Capture")
     except OSError as e:
         return Told("blocked", ("The folder cannot be read:", str(e.strerror)), "Capture")
+    if scene.arto.photographs and not (place.source / "field").exists():
+        return Told("none", ("The photographs are not read yet",), "Capture")
     if place.owner:
         return Told("other", (tr("Captured for {owner}", owner=place.owner),), "Capture")
     stopped = status.stopped(place.source)
@@ -95,6 +97,12 @@ def _told(
     if field_line is None:
         return Told("unfitted", ("Captured, but not fitted yet",), "Continue")
     text, serves = field_line
+    if serves and scene.arto.photographs:
+        there = status.field_of(place.source)
+        when = _when(place.source / "field" / FIELD_HEADER)
+        patches = len(there.hemicube) if there else 0
+        text = tr("Ready, read {when}, {patches} patches", when=when, patches=patches)
+        return Told("ready", (text,), "Capture Again")
     more = (tr("Another capture: {tiles} done", tiles=status.done(goes_on)),) if goes_on else ()
     if not serves:
         then = _shot(place.source)

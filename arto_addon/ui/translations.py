@@ -24,6 +24,10 @@ Capture Again | Neu aufnehmen | 再キャプチャ
 Capture This Too | Auch aufnehmen | これもキャプチャ
 Continue | Fortsetzen | 続行
 Set Back | Zurückstellen | 元に戻す
+Open Photographs | Fotos öffnen | 写真を開く
+Read Again | Neu einlesen | 再読み込み
+Ready, read {when}, {patches} patches | Bereit, eingelesen {when}, {patches} Felder | 準備完了、読み込み {when}、{patches} パッチ
+The photographs are not read yet | Die Fotos sind noch nicht eingelesen | 写真はまだ読み込まれていません
 Use It Here | Hier verwenden | ここで使う
 Cancel | Abbrechen | キャンセル
 Discard Unfinished | Unfertiges verwerfen | 未完了を破棄

@@ -88,7 +88,7 @@ def show_captured(job: SecondBlender) -> str:
         there = field_of(paths.place(scene, layer_of(scene)).source)
         if there is not None:
             own.sync(scene, there)
-    if job.verb == "shoot" and job.state.result:
+    if job.verb in ("shoot", "photographs") and job.state.result:
         if live.current is not None and live.current.by_itself:
             live.stop()  # the plate takes its place
         return show_relit(job)
@@ -167,6 +167,7 @@ _FINISHERS: dict[Verb, Callable[[SecondBlender], str]] = {
     "shoot": show_captured,
     "more_samples": show_captured,
     "fit": show_captured,
+    "photographs": show_captured,
     "verify": show_verified,
     "match": show_matched,
     "even_out": show_matched,

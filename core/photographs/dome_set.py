@@ -71,12 +71,15 @@ class Written:
         The share of pixels that are saturated in every exposure of some lamp.
     level : float
         What the pictures were multiplied by, beside the lamps' strengths.
+    reach : float
+        Degrees around its direction for which a lamp stands.
     """
 
     lamps: Lamps
     hole: float
     saturated: float
     level: float
+    reach: float = 180.0
 
 
 def rows_at_once(count: int, width: int, budget: int | None = None) -> int:
@@ -173,7 +176,35 @@ def write(
     heads.write(folder, heads.from_json(head.to_json() | said_so | about, folder))
     hole = max(0.0, 1 - float(hemicube.solid_angles.sum()) / (4 * np.pi))
     yield 1.0
-    return Written(found, hole, saturated / (height * width), level)
+    return Written(found, hole, saturated / (height * width), level, hemicube.reach)
+
+
+def small_pictures(
+    photos: Photographs, most: int = SMALL
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Read the light of each lamp in every n-th pixel.
+
+    Parameters
+    ----------
+    photos : Photographs
+    most : int
+        Pixels of all lamps together, roughly.
+
+    Returns
+    -------
+    light : (K, h, w, 3) float32
+        Without what is there without the lamp; NaN where it is saturated.
+    alpha : (h, w) float32
+    """
+    taking, count = _Taking(photos), len(photos.said.lamps)
+    height, width = photos.shape
+    step = max(1, int(np.sqrt(height * width * count / (16 * most))))
+    pictures = []
+    for k in range(count):
+        light, bright = taking.rows(k, 0, height)
+        light[bright] = np.nan
+        pictures.append(light[::step, ::step])
+    return np.stack(pictures), taking.alpha(0, height)[::step, ::step]
 
 
 def _write_tile(

@@ -16,6 +16,7 @@ Examples
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,14 +74,23 @@ class HeldOut:
         """The mean error over all lamps."""
         return float(np.mean([row.error for row in self.rows]))
 
-    @property
-    def table(self) -> str:
-        """The rows as lines of text, the worst first."""
-        lines = ["lamp  degrees to next  error  nearest lamp's  gain"]
+    def table(self, names: Mapping[int, str] | None = None) -> str:
+        """Write the rows as lines of text, the worst first.
+
+        Parameters
+        ----------
+        names : dict of int to str, optional
+            A name of each lamp.
+
+        Returns
+        -------
+        str
+        """
+        lines = ["lamp  to the next  error  nearest lamp's error   gain  photograph"]
         for r in sorted(self.rows, key=lambda r: -r.error):
-            lines.append(
-                f"{r.lamp:4d} {r.apart:16.1f} {r.error:6.3f} {r.nearest:15.3f} {r.gain:5.2f}"
-            )
+            name = (names or {}).get(r.lamp, "")
+            numbers = f"{r.lamp:4d} {r.apart:9.1f} deg {r.error:6.1%} {r.nearest:21.1%}"
+            lines.append(f"{numbers} {r.gain:6.2f}  {name}".rstrip())
         return "\n".join(lines)
 
 

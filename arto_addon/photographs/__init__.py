@@ -1,0 +1,1 @@
+"""Photographs of a real thing, opened as a shot."""
