@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import bpy
 
@@ -15,7 +16,12 @@ def use_own() -> None:
 
     Raises ExrError where this Blender has none, as distributions may build it.
     """
-    exr.choose(exr.OpenImageIo(exr.imported(_modules())))
+    exr.choose(exr.OpenImageIo(own()))
+
+
+def own() -> ModuleType:
+    """Import Blender's own OpenImageIO. Raises ExrError where this Blender has none."""
+    return exr.imported(_modules())
 
 
 def _modules() -> list[Path]:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-import sys
 from pathlib import Path
 
 import bpy
 
-from ...core.errors import PhotographsError, SceneError
+from ...core.errors import SceneError
 from ...core.photographs import folder as folders
 from ...core.photographs.opened import Photographs
 from ...core.photographs.reader import Reader, by_openimageio
+from ..blender import exr_library
 from ..blender.colour import working_space
 from ..shot import home
 
@@ -24,16 +24,8 @@ SPAN = 2.0
 
 
 def reader() -> Reader:
-    """What reads pictures: the OpenImageIO that Blender brings along. Raises PhotographsError."""
-    bpy.utils.expose_bundled_modules()
-    try:
-        import OpenImageIO
-    except ImportError as e:
-        raise PhotographsError(
-            f"this Blender has no OpenImageIO for Python ({sys.version.split()[0]}), which reads "
-            "photographs: install it, or use Blender from blender.org"
-        ) from e
-    return by_openimageio(OpenImageIO)
+    """What reads pictures: Blender's own OpenImageIO. Raises ExrError where it has none."""
+    return by_openimageio(exr_library.own())
 
 
 def opened(folder: Path) -> Photographs:
