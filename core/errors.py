@@ -84,3 +84,7 @@ class FarmError(ArtoError):
 
 class KitError(ArtoError):
     """A light kit that cannot be: a number out of bounds, or a description of something else."""
+
+
+class WebError(ArtoError):
+    """A shot for a page in a browser that is damaged, or that cannot be made."""
