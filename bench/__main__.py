@@ -6,7 +6,14 @@ import argparse
 import sys
 from pathlib import Path
 
-from . import first, heavy_command, match_command, mirrors_command, place_command
+from . import (
+    finish_command,
+    first,
+    heavy_command,
+    match_command,
+    mirrors_command,
+    place_command,
+)
 
 
 def _demo(options: argparse.Namespace) -> None:
@@ -296,6 +303,7 @@ def main() -> int:
     first.add(commands)
     heavy_command.add(commands)
     place_command.add(commands)
+    finish_command.add(commands)
 
     c = commands.add_parser("noise", help="where to take out the noise of a capture")
     c.add_argument("--json", type=Path, default=Path("out/noise.json"))

@@ -51,6 +51,7 @@ class Settings:
     footage: Any
     live_finish: bool
     live_first: bool
+    finish_samples: int
     looks: Looks
     active_look: int
     own_groups: Lamps

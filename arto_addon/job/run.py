@@ -25,7 +25,7 @@ from ..blender import devices, scripts
 from ..blender.compositing import places_of_groups
 from ..blender.front import to_front
 from ..shot import home
-from ..work import STOPPED, Progress, Render, Steps, run
+from ..work import STOPPED, Progress, Render, Steps, Wrote, run
 from .snapshot import put_pixels
 from .task import State, Task
 from .verbs import VERBS
@@ -53,7 +53,7 @@ def main(path: Path) -> int:
             made = run(_steps(Task.read(path), folder), writer)
         state = State(1.0, writer.text, end="done", result=str(made or ""))
     except CancelledError as e:
-        state, code = State(writer.share, str(e), end="cancelled"), 130
+        state, code = State(writer.share, str(e), end="cancelled", result=writer.result), 130
     except ArtoError as e:
         state, code = State(writer.share, str(e), end="failed"), 1
     except Exception as e:
@@ -149,6 +149,7 @@ class _Writer:
         self.text = "starting"
         self._first: tuple[float, float] | None = None
         self._written = 0.0
+        self.result = ""
         self._render: Render | None = None
 
     def __call__(self, step: Progress | Render) -> None:
@@ -157,6 +158,8 @@ class _Writer:
         self._render = step if isinstance(step, Render) else None
         said = self.text
         self.share, self.text = min(step.share, 1.0), step.text
+        if isinstance(step, Wrote):
+            self.result = str(step.path)
         if self._render and self._first is None:
             # what an earlier run had done took no time in this one: count from here
             self._first = time.monotonic(), step.share
@@ -177,7 +180,9 @@ class _Writer:
         with contextlib.suppress(
             OSError
         ):  # progress matters little: the work itself reports a full disk
-            State(self.share, self.text, now - self.begun, left).write(self.folder)
+            State(self.share, self.text, now - self.begun, left, result=self.result).write(
+                self.folder
+            )
 
     @contextlib.contextmanager
     def samples(self) -> Iterator[None]:

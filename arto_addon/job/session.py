@@ -7,7 +7,6 @@ so undo or opening another file does not disturb it.
 from __future__ import annotations
 
 import contextlib
-import re
 import subprocess
 import tempfile
 import time
@@ -34,6 +33,7 @@ from . import snapshot
 from .run import CANCEL, PATIENCE
 from .task import State
 from .verbs import VERBS, Verb
+from .words import plain
 
 # Seconds between the window's looks at a job's progress.
 EVERY = 0.2
@@ -106,6 +106,7 @@ class SecondBlender:
             self.remove()
             raise
         self.told: float | None = None
+        self.seen = 0  # when the picture was written that is shown of a work that goes on
         self.state = State()
 
     def is_of(self, scene: bpy.types.Scene) -> bool:
@@ -126,7 +127,7 @@ class SecondBlender:
                 self.process.kill()
             return True
         if not found.end and self.told:
-            found = State(found.share, self.stopped, end="cancelled")
+            found = State(found.share, self.stopped, end="cancelled", result=found.result)
         elif not found.end:
             text = f"its Blender ended too early ({ended_by(self.process.returncode)})"
             lines = self._last_lines()
@@ -140,6 +141,8 @@ class SecondBlender:
     @property
     def stopped(self) -> str:
         """What to say where the job did not come to its end."""
+        if VERBS[self.verb].grows:
+            return "stopped: the picture and its samples are kept, and the button goes on with them"
         if VERBS[self.verb].captures:
             return "cancelled: parts that were finished are kept"
         return "cancelled: nothing was changed"
@@ -289,6 +292,7 @@ def _follow() -> float | None:
         return EVERY if _leaving else None
     job = current
     if job.look():
+        _show_meanwhile(job)
         _show_share(job)
         for follow in followers:
             follow(job)
@@ -299,8 +303,9 @@ def _follow() -> float | None:
     try:
         level = {"done": "INFO", "cancelled": "WARNING"}.get(job.state.end, "ERROR")
         text = job.state.text
-        if job.state.end == "done" and job.verb in finishers:
-            text = finishers[job.verb](job)
+        stopped = job.state.end == "cancelled" and VERBS[job.verb].grows and job.state.result
+        if (job.state.end == "done" or stopped) and job.verb in finishers:
+            text, level = finishers[job.verb](job), "INFO"
         _say(job, level, text)
     except Exception as e:
         _say(job, "ERROR", f"{type(e).__name__}: {e}")
@@ -312,6 +317,17 @@ def _follow() -> float | None:
         paths.forget()
         watch.redraw()
     return EVERY if _leaving else None
+
+
+def _show_meanwhile(job: SecondBlender) -> None:
+    """Show the picture of a work that makes it better and better, each time it was written."""
+    if not VERBS[job.verb].grows or not job.state.result or _in_the_middle():
+        return
+    with contextlib.suppress(OSError):  # just now it may be replaced
+        written, before = Path(job.state.result).stat().st_mtime_ns, job.seen
+        job.seen = written
+        if written != before:
+            finishers[job.verb](job)
 
 
 def _say(job: SecondBlender, level: str, text: str) -> None:
@@ -339,18 +355,6 @@ _HANDS = (
 def _in_the_middle() -> bool:
     windows = bpy.context.window_manager.windows
     return any(o.bl_idname.startswith(_HANDS) for w in windows for o in w.modal_operators)
-
-
-_RENDERS = re.compile(r"render (\d+) of (\d+): \d+ basis images")
-
-
-def plain(text: str) -> str:
-    """A job's text in an artist's words."""
-    found = _RENDERS.fullmatch(text)
-    if found is None:
-        return text
-    part, parts = found.groups()
-    return "rendering" if parts == "1" else f"rendering, part {part} of {parts}"
 
 
 def _show_share(job: SecondBlender | None) -> None:

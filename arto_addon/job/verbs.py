@@ -16,10 +16,11 @@ from ..fit.fit import fit
 from ..match.match import even_out, match_target
 from ..photographs.read import read_and_relight
 from ..plate.composite import save_composite
-from ..plate.verify import verify_plate
+from ..relight.finished import finish_plate
 from ..relight.looks import relight_looks
 from ..relight.many import frames_of, relight_many
 from ..relight.relight import compute
+from ..relight.verify import verify_plate
 from ..shoot import shoot
 from ..stage.settings import samples_of
 from ..work import Steps
@@ -34,6 +35,7 @@ Verb = Literal[
     "more_samples",
     "relight_looks",
     "verify",
+    "finish",
     "composite",
     "match",
     "even_out",
@@ -47,12 +49,15 @@ class Work:
 
     steps: the work on a scene and a view layer, which returns the file that the window shows, or a
     folder, or None; doing: what the artist is told, before the shot's
-    title; captures: whether the work changes the capture, so that no other process may meanwhile.
+    title; captures: whether the work changes the capture, so that no other process may meanwhile;
+    grows: whether it makes one picture better and better until it is stopped, which is shown
+    meanwhile.
     """
 
     steps: Callable[[bpy.types.Scene, str], Steps[Path | None]]
     doing: str
     captures: bool = False
+    grows: bool = False
 
 
 def _capture_frames(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
@@ -93,6 +98,7 @@ VERBS: Mapping[Verb, Work] = {
     "more_samples": Work(_more_samples, "adding samples to", captures=True),
     "relight_looks": Work(_relight_looks, "relighting the looks of"),
     "verify": Work(verify_plate, "verifying the plate of"),
+    "finish": Work(finish_plate, "finishing the plate of", grows=True),
     "composite": Work(save_composite, "compositing"),
     "match": Work(match_target, "looking for the light of"),
     "photographs": Work(read_and_relight, "reading the photographs of", captures=True),

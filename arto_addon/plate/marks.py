@@ -20,7 +20,7 @@ PLATE = "arto.plate"
 # Attributes that files of earlier versions have, which do not name their plate.
 _OF_EARLIER = ("arto.light key", "arto.verify")
 # What the names of files beside a plate end with.
-ENDINGS = ("catcher", "light", "layers", "data", "comp", "verify")
+ENDINGS = ("catcher", "light", "layers", "data", "comp", "verify", "samples", "finished")
 # What the names of scripts for compositors beside a plate end with; no script is as long as that.
 SCRIPTS, _LONG = (".nk", ".comp"), 1 << 22
 

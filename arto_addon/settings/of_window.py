@@ -97,6 +97,21 @@ SHOWN = (
         panels=("Quality",),
     ),
     Setting(
+        name="finish_samples",
+        kind="whole",
+        title="Finish At",
+        words="Finish ends by itself when the picture has so many samples a pixel. 0: it goes on "
+        "until it is stopped",
+        least=0,
+        soft_most=4096,
+        default=0,
+        work="relight",
+        decides=Decides.NOTHING,
+        farm=False,
+        option=False,
+        panels=("Result",),
+    ),
+    Setting(
         name="looks",
         kind="list",
         work="relight",

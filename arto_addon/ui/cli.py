@@ -30,6 +30,7 @@ from ..fit.fit import fit
 from ..job import run as job
 from ..live import maps
 from ..match.apply import match_and_apply
+from ..relight.finished import finish_plate
 from ..relight.many import relight_frames, relight_many
 from ..relight.relight import relight
 from ..shot import home, paths, scene_id
@@ -154,7 +155,9 @@ def _do(verb: str, options: dict[str, Any], report: Report) -> None:
         files = [w.resolve() for w in worlds or ()]
         work = relight_many(scene, layer, files, turns, frames or (), batch)
     else:
-        work = {"capture": capture, "fit": fit, "relight": relight}[verb](scene, layer)
+        work = {"capture": capture, "fit": fit, "relight": relight, "finish": finish_plate}[verb](
+            scene, layer
+        )
     run(_as_asked(work, batch, many), report)
     if verb == "capture" and named is None:
         _say_unsaved(verb, paths.place(scene, layer).folder)

@@ -102,6 +102,16 @@ def parser() -> argparse.ArgumentParser:
         _from_one,
         _number,
     )
+    one = jobs.add_parser("finish", parents=[files, told], help="make the plate better by samples")
+    one.add_argument(
+        "--samples",
+        type=_from_one,
+        required=True,
+        dest="finish_samples",
+        help="samples a pixel at which the picture is finished",
+    )
+    one.add_argument("--output", type=_text, help="the plate (default: beside the .blend)")
+    one.add_argument("--look", type=_text, help="the look that the plate is of")
     _add_light(jobs.add_parser("light", parents=[files], help="read or write the light kit"))
     _add_adopt(jobs.add_parser("adopt", parents=[files], help="use another file's captures"))
     _add_status(jobs.add_parser("status", parents=[files], help="say what there is of a shot"))

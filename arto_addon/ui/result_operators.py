@@ -11,7 +11,8 @@ from ..plate import compare
 from ..plate.composite import save_composite
 from ..plate.names import relit_file
 from ..plate.plate import name_of, show, shown_file
-from ..plate.verify import verify_plate
+from ..relight.finished import finish_plate
+from ..relight.verify import verify_plate
 from ..work import Steps
 from .long_work import LongWork
 from .operators import Quick, free
@@ -86,6 +87,22 @@ differs from them by more than their noise"""
         return verify_plate(scene, view_layer)
 
 
+class ARTO_OT_finish(LongWork):
+    """Make the relit picture better and better by samples of a render, in the background, until \
+it is stopped"""
+
+    bl_idname = "arto.finish"
+    bl_label = "Finish"
+    verb = "finish"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return free(cls) and _has_plate(cls, context)
+
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps[object]:
+        return finish_plate(scene, view_layer)
+
+
 class ARTO_OT_save_composite(LongWork):
     """Save what the scene's compositor makes of the relit picture, in the scene's output format, \
 without rendering"""
@@ -106,5 +123,6 @@ CLASSES = (
     ARTO_OT_show_plate,
     ARTO_OT_compare,
     ARTO_OT_verify,
+    ARTO_OT_finish,
     ARTO_OT_save_composite,
 )

@@ -14,8 +14,9 @@ from ..blender.words import tr
 from ..job import session
 from ..job.verbs import Verb
 from ..plate.names import relit_file
-from ..plate.verify import verify_file
+from ..relight.finished import SAID, finished_file
 from ..relight.light_key import HEADER, light_key
+from ..relight.verify import verify_file
 from ..shot import home, paths, status
 from ..shot.shot import layer_of
 from ..world.check import world_of
@@ -23,7 +24,14 @@ from . import shot_panel, thumbnails
 from .places import Draws, say, slot
 
 # The jobs of which this panel says how they ended.
-WORKS: tuple[Verb, ...] = ("relight", "relight_frames", "relight_looks", "verify", "composite")
+WORKS: tuple[Verb, ...] = (
+    "relight",
+    "relight_frames",
+    "relight_looks",
+    "verify",
+    "finish",
+    "composite",
+)
 # Seconds for which the line about the plate is kept: a panel is drawn at every mouse move.
 _HOLDS = 0.4
 _last: dict[str, tuple[float, tuple[str, bool]]] = {}
@@ -110,6 +118,10 @@ class Result(Draws):
         _seen(column, context)
         column.operator("arto.verify", icon="VIEWZOOM")
         _verified(column, context, path)
+        row = column.row(align=True)
+        row.operator("arto.finish", icon="SHADING_RENDERED")
+        row.prop(settings, "finish_samples")
+        _finished(column, context, path)
         column.separator(factor=0.5)
         column.prop(settings, "use_in_compositor", text="")
         column.operator("arto.save_composite", icon="FILE_TICK")
@@ -135,6 +147,17 @@ def _seen(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
         return
     for line in context.window_manager.arto.seen.splitlines():
         say(column, context, line)
+
+
+def _finished(column: bpy.types.UILayout, context: bpy.types.Context, path: Path | None) -> None:
+    """Draw in two lines of what the finished picture is, where it is of this plate."""
+    text = ""
+    with contextlib.suppress(OSError, ArtoError):
+        if path and finished_file(path).is_file():
+            header = header_of(finished_file(path))
+            if header.get(HEADER) == header_of(path).get(HEADER):
+                text = f"Finished: {header.get(SAID, '')}"
+    slot(column, context, text or "Puts the picture and samples of a render together", "INFO")
 
 
 def _verified(column: bpy.types.UILayout, context: bpy.types.Context, path: Path | None) -> None:

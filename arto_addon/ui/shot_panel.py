@@ -11,6 +11,7 @@ from ..blender.words import tr
 from ..job import session
 from ..job.session import SecondBlender
 from ..job.verbs import Verb
+from ..job.words import plain
 from ..shot import status
 from ..stage.settings import looks_otherwise, samples_of
 from ..stage.stage import picture_size
@@ -114,7 +115,7 @@ def running(column: bpy.types.UILayout, context: bpy.types.Context, job: SecondB
     mouse.
     """
     column.separator(factor=0.5)
-    text = tr(session.plain(job.state.text))
+    text = tr(plain(job.state.text))
     if not job.is_of(context.scene):
         text = f"{job.title}: {text}"
     column.label(text=shortened(context, text), translate=False)

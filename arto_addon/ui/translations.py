@@ -38,6 +38,8 @@ Compare | Vergleichen | 比較
 Look Inside | Hineinsehen | 内部を見る
 Light from Here | Licht von hier | ここからの光
 Verify | Prüfen | 検証
+Finish | Vollenden | 仕上げ
+Finish At | Vollendet bei | 仕上げの終了
 The light of frame {now}, on the shot of frame {was} | Das Licht von Bild {now}, auf der Einstellung von Bild {was} | フレーム {was} のショットに、フレーム {now} の光
 Live shows the shot that it was switched on for: this is another one | Live zeigt die Einstellung, für die es eingeschaltet wurde: dies ist eine andere | ライブは、オンにしたときのショットを表示します。これは別のショットです
 As in a Picture | Wie auf einem Bild | 写真のように

@@ -21,10 +21,11 @@ from ..plate import compare
 from ..plate.names import relit_file
 from ..plate.plate import name_of, show
 from ..plate.present import present, present_frames
-from ..plate.verify import verify_file
 from ..relight import inside
+from ..relight.finished import FINISHED, finished_file
 from ..relight.many import frames_of
 from ..relight.shown import newest
+from ..relight.verify import verify_file
 from ..shot import paths
 from ..shot.shot import layer_of
 from ..shot.status import field_of
@@ -125,6 +126,17 @@ def show_verified(job: SecondBlender) -> str:
     return job.state.text
 
 
+def show_finished(job: SecondBlender) -> str:
+    """Show the picture that plate and samples make together."""
+    scene = _scene_of(job)
+    path = Path(job.state.result)
+    if scene is not None and path == finished_file(relit_file(scene)):
+        window = bpy.context.window_manager.windows[0]
+        with bpy.context.temp_override(window=window):
+            reveal(show(path, f"{name_of(scene)} {FINISHED}"))
+    return job.state.text
+
+
 def show_matched(job: SecondBlender) -> str:
     """Make the look that a match has found, and show the shot in it."""
     scene = _scene_of(job)
@@ -169,6 +181,7 @@ _FINISHERS: dict[Verb, Callable[[SecondBlender], str]] = {
     "fit": show_captured,
     "photographs": show_captured,
     "verify": show_verified,
+    "finish": show_finished,
     "match": show_matched,
     "even_out": show_matched,
 }

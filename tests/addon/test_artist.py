@@ -15,9 +15,9 @@ from arto.arto_addon.plate import compare
 from arto.arto_addon.plate.composite import composite_file, save_composite
 from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.plate.present import present, use
-from arto.arto_addon.plate.verify import verify_file, verify_plate
 from arto.arto_addon.relight import inside, looks
 from arto.arto_addon.relight.relight import compute
+from arto.arto_addon.relight.verify import verify_file, verify_plate
 from arto.arto_addon.shot import paths, status
 from arto.arto_addon.stage.settings import samples_of
 from arto.arto_addon.ui import overlay, result_panel, state

@@ -121,6 +121,7 @@ def test_lists_decide_what_they_say(scene):
 OF_NO_PLATE = {
     "look", "output", "overwrite", "use_in_compositor", "compare", "wipe", "live_finish",
     "live_first", "looks", "active_look", "active_own_group", "active_group",
+    "finish_samples",
 }  # fmt: skip
 
 

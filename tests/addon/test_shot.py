@@ -16,8 +16,8 @@ from arto.arto_addon.capture import capture
 from arto.arto_addon.fit import fit
 from arto.arto_addon.plate import plate
 from arto.arto_addon.plate.names import relit_file
-from arto.arto_addon.plate.verify import verify_file
 from arto.arto_addon.relight import ahead
+from arto.arto_addon.relight.verify import verify_file
 from arto.arto_addon.shot import paths, scene_id, status
 from arto.core.capture.capture_set import CaptureSet
 from arto.core.errors import BusyError, CaptureSetError, ShotError

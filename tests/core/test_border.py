@@ -98,7 +98,7 @@ FLOW = {
     < files < places < arrays < signed < region < file_names < description < values < shot
     < metrics < patterns < measure < faces < partition < dome < hemicube < mix < exr < cryptomatte
     < capture < light < kit < supports < field < fit < lights < relight < catcher < preview
-    < inside < place < match < verify < photographs < web""",
+    < inside < place < match < verify < finish < photographs < web""",
     "arto_addon": """interrupt < work < settings < blender < stage < shot < kit < world < plate
     < fit < capture < photographer < relight < match < shoot < photographs < job < live
     < farm < ui""",

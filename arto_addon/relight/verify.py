@@ -6,25 +6,22 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core import exr
-from ...core.capture.names import combined
 from ...core.errors import SceneError
 from ...core.field.field import Field
 from ...core.verify import Verdict, marked, verify
+from ..plate import marks, plate
+from ..plate.marks import PLATE
+from ..plate.names import relit_file
 from ..shot import paths
 from ..shot.shot import layer_of
-from ..stage.small import parts_of
-from ..stage.stage import stage
 from ..work import Progress, Steps
 from ..world.own import gains_of
-from . import marks, plate
-from .marks import PLATE
-from .names import relit_file
+from .samples import FIRST, keep, kept, key_now, render, truth
 
-# Samples of each of the two renders.
-SAMPLES = 16
+# The most samples of each of the two renders that a look at a plate adds.
+MOST = 256
 
 
 def verify_file(path: Path) -> Path:
@@ -35,6 +32,7 @@ def verify_file(path: Path) -> Path:
 def verify_plate(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps[Path]:
     """Render the scene twice with a few samples, and compare the plate with both renders.
 
+    The samples are kept: the next time there are twice as many, as long as the light is the same.
     Returns the path of a picture that marks where the plate is off by more than noise. The header
     of the picture has the result in words. Raises SceneError where there is no plate, where its
     size differs from a render's, or where pixels are not finite; CancelledError.
@@ -51,39 +49,29 @@ def verify_plate(scene: bpy.types.Scene, view_layer: str | None = None) -> Steps
     out = verify_file(path)
     marks.check(out, path, scene.arto.overwrite)
     there = next(iter(exr.read(path).values()))
-    renders: list[NDArray[np.float32]] = []
-    for seed in (1, 2):
-        with stage(scene, layer) as on:
-            on.change("render.engine", "CYCLES")
-            on.change("cycles.samples", SAMPLES)
-            on.change("cycles.seed", scene.cycles.seed + 7919 * seed)
-            on.change("cycles.use_animated_seed", False)
-            on.change("cycles.use_layer_samples", "IGNORE")
-            on.change("cycles.use_adaptive_sampling", False)
-            on.change("cycles.use_denoising", False)
-            on.change("cycles.time_limit", 0.0)
-            # The plate has all light. A clamped render would leave light out and differ by that.
-            on.change("cycles.sample_clamp_direct", 0.0)
-            on.change("cycles.sample_clamp_indirect", 0.0)
-            on.change("render.use_crop_to_border", False)
-            text = f"rendering {SAMPLES} samples to compare with, {seed} of 2"
-            parts = yield from parts_of(on, text, (seed - 1) / 2, 0.5)
-            renders.append(combined(parts))
-    if renders[0].shape[:2] != there.shape[:2]:
+    key = key_now(scene, layer)
+    found = kept(path, key)
+    # each time the verdict is of twice the samples
+    more = min(found.count, MOST) if found else FIRST
+    with truth(scene, layer) as on:
+        seed = scene.cycles.seed
+        fresh = yield from render(on, seed, found.count if found else 0, more, 0.0, 0.95)
+    samples = found.more(fresh) if found else fresh
+    keep(scene, path, key, samples)
+    if samples.one.shape[:2] != there.shape[:2]:
         raise SceneError("the plate has another size than a render now: press Relight first")
-    for what, picture in (("the plate", there), ("the render", renders[0] + renders[1])):
-        if bad := int((~np.isfinite(picture)).any(axis=-1).sum()):
-            raise SceneError(
-                f"{what} has {bad} pixels that are infinite or not a number, and cannot be compared"
-            )
+    if bad := int((~np.isfinite(there)).any(axis=-1).sum()):
+        raise SceneError(
+            f"the plate has {bad} pixels that are infinite or not a number, and cannot be compared"
+        )
     yield Progress(0.95, "comparing")
-    samples = Field(paths.field_folder(scene, layer)).about.samples or SAMPLES
-    ratio = 2 * SAMPLES / samples
-    found = verify(there[..., :3], renders[0][..., :3], renders[1][..., :3], own=ratio)
-    told = {"verify": said(scene, found), "samples": f"2 x {SAMPLES}"}
+    captured = Field(paths.field_folder(scene, layer)).about.samples or samples.count
+    ratio = 2 * samples.count / captured
+    verdict = verify(there[..., :3], samples.one[..., :3], samples.two[..., :3], own=ratio)
+    told = {"verify": said(scene, verdict), "samples": f"2 x {samples.count}"}
     told[PLATE.removeprefix("arto.")] = path.name
     # All pixels are written, whatever the plate's windows: only Blender shows this file.
-    exr.write(out, {"": marked(there, found)}, *plate.header_of(scene, told))
+    exr.write(out, {"": marked(there, verdict)}, *plate.header_of(scene, told))
     yield Progress(1.0, told["verify"])
     return out
 
