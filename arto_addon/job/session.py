@@ -11,7 +11,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import IO
 
@@ -30,6 +30,7 @@ from ..blender.quitting import not_when_quitting, when_quitting
 from ..shot import paths, watch
 from ..shot.shot import shot_of
 from . import snapshot
+from .outcome import Outcome
 from .run import CANCEL, PATIENCE
 from .task import State
 from .verbs import VERBS, Verb
@@ -40,24 +41,6 @@ EVERY = 0.2
 LOG = "log.txt"
 # Bytes of the log's end that are looked at.
 _LONGEST = 1 << 16
-
-
-@dataclass
-class Outcome:
-    """How the last job that the artist asked for ended.
-
-    level: `INFO`, `WARNING` or `ERROR`; blend, scene_id: the file and the scene that it was for.
-    """
-
-    level: str
-    text: str
-    verb: Verb | None = None
-    blend: str = ""
-    scene_id: str = ""
-
-    def is_of(self, scene: bpy.types.Scene) -> bool:
-        """Whether the job was for this scene of this file."""
-        return (self.blend, self.scene_id) == (bpy.data.filepath, scene.arto.scene_id)
 
 
 class SecondBlender:
