@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import struct
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
 import numpy as np
+from arto.core.exr.head import parsed
 
 
 def layers(size: tuple[int, int] = (37, 23), seed: int = 0) -> dict[str, np.ndarray]:
@@ -20,3 +25,30 @@ def same(found: dict[str, np.ndarray], given: dict[str, np.ndarray]) -> None:
         expected = pixels[..., None] if pixels.ndim == 2 else pixels
         assert found[name].dtype == expected.dtype
         np.testing.assert_array_equal(found[name], expected)
+
+
+def headers_of(path: Path) -> bytes:
+    """The bytes of a file before its tables of chunks."""
+    data = path.read_bytes()
+    return data[: parsed(data)[1]]
+
+
+def damaged(sound: Sequence[bytes], count: int) -> Iterator[bytearray]:
+    """Files that are cut, flipped, and overwritten with large and with negative numbers."""
+    rng = np.random.default_rng(7)
+    for turn in range(count):
+        data = bytearray(sound[turn % len(sound)])
+        kind = turn // len(sound) % 4
+        if kind == 0:
+            data = data[: rng.integers(0, len(data))]
+        elif kind == 1:
+            for at in rng.integers(0, len(data), 5):
+                data[at] ^= 1 << int(rng.integers(8))
+        elif kind == 2:  # in the headers and tables, where numbers are
+            at = int(rng.integers(4, min(len(data) - 8, 1200)))
+            value = int(rng.choice([0, -1, 2**31 - 1, -(2**31), 1 << 24, 65536]))
+            struct.pack_into("<i", data, at, value)
+        else:
+            at, length = int(rng.integers(0, len(data) - 64)), int(rng.integers(1, 64))
+            data[at : at + length] = rng.integers(0, 256, length, np.uint8).tobytes()
+        yield data

@@ -95,7 +95,7 @@ def decoded(kind: bytes, data: bytes) -> Any:
     """
     try:
         if kind == b"string":
-            return data.decode("utf-8", "surrogateescape")
+            return data.decode()
         if kind in _NUMBERS:
             found = struct.unpack(f"<{_NUMBERS[kind]}", data)
             return found[0] if _NUMBERS[kind] in "ifd" else found
@@ -111,6 +111,8 @@ def decoded(kind: bytes, data: bytes) -> Any:
             return COMPRESSIONS[number] if number < len(COMPRESSIONS) else Raw(kind, data)
         if kind == b"stringvector":
             return _strings(data)
+    except UnicodeDecodeError:
+        raise LayoutError("a text in its header is no UTF-8") from None
     except (struct.error, ValueError):
         raise LayoutError("its header is damaged") from None
     return Raw(kind, data)
@@ -137,7 +139,7 @@ def encoded(name: str, value: Any) -> tuple[bytes, bytes]:
     """
     try:
         if isinstance(value, str):
-            return b"string", value.encode("utf-8", "surrogateescape")
+            return b"string", value.encode()
         if isinstance(value, Raw):
             return value.kind, value.data
         if type(value) is int:
@@ -153,7 +155,7 @@ def encoded(name: str, value: Any) -> tuple[bytes, bytes]:
                 return b"timecode", struct.pack("<II", int(digits, 16), 0)
         if isinstance(value, tuple | list) and value:
             if all(isinstance(v, str) for v in value):
-                texts = [v.encode("utf-8", "surrogateescape") for v in value]
+                texts = [v.encode() for v in value]
                 packed = [struct.pack("<I", len(text)) + text for text in texts]
                 return b"stringvector", b"".join(packed)
             kind = _SEVERAL.get((type(value[0]), len(value)))
@@ -222,5 +224,5 @@ def _strings(data: bytes) -> tuple[str, ...]:
         at += 4 + length
         if at > len(data):
             raise ValueError("a text is cut off")
-        found.append(data[at - length : at].decode("utf-8", "surrogateescape"))
+        found.append(data[at - length : at].decode())
     return tuple(found)

@@ -119,12 +119,15 @@ def parsed(data: mmap.mmap | bytes) -> tuple[list[PartLayout], int]:
         raise LayoutError("its pixels are deep: flatten it first")
     multipart, tiled = bool(flags & MULTIPART), bool(flags & 0x200)
     parts, at = [], 8
-    while True:
-        attributes, at = _attributes(data, at)
-        if attributes:
-            parts.append(_part(attributes, multipart, tiled))
-        if not attributes or not multipart:
-            break
+    try:
+        while True:
+            attributes, at = _attributes(data, at)
+            if attributes:
+                parts.append(_part(attributes, multipart, tiled))
+            if not attributes or not multipart:
+                break
+    except UnicodeDecodeError:
+        raise LayoutError("a name in its header is no UTF-8") from None
     if not parts:
         raise LayoutError("it has no header")
     return parts, at
@@ -173,6 +176,7 @@ def _attributes(data: mmap.mmap | bytes, at: int) -> tuple[Attributes, int]:
         if not name:
             return found, at
         kind, at = _text(data, at)
+        name.decode(), kind.decode()
         if at + 4 > len(data):
             break
         size = struct.unpack_from("<I", data, at)[0]
@@ -219,7 +223,7 @@ def _part(found: Attributes, multipart: bool, tiled: bool) -> PartLayout:
         chunks = said_chunks
     if chunks is None or chunks < 1 or (multipart and said_chunks not in (None, chunks)):
         raise LayoutError("its number of chunks is not that of its pixels")
-    name = attributes.get(b"name", b"").rstrip(b"\0").decode("utf-8", "replace")
+    name = attributes.get(b"name", b"").rstrip(b"\0").decode()
     whole = attributes[b"displayWindow"] == attributes[b"dataWindow"]
     whole &= PICTURE.encode() not in attributes
     return PartLayout(
@@ -248,7 +252,7 @@ def _channels(data: bytes) -> tuple[tuple[tuple[str, int], ...], bool]:
         at += 16
         if kind not in _PIXEL_BYTES or x < 1 or y < 1:
             raise LayoutError("it has a damaged channel")
-        found.append((name.decode("utf-8", "replace"), kind))
+        found.append((name.decode(), kind))
         sampled |= x > 1 or y > 1
     if not found:
         raise LayoutError("it has no channels")

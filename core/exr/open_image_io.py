@@ -184,10 +184,7 @@ class OpenImageIo:
             raise _unread(path, file.geterror)
         spec, kinds = file.spec(), dict(part.channels)
         size = part.height, part.width
-        try:
-            names = list(spec.channelnames)
-        except UnicodeDecodeError:
-            names = []
+        names = list(spec.channelnames)
         if (spec.height, spec.width) != size or sorted(names) != sorted(kinds):
             raise ExrError(f"{path} has a damaged part: make it again")
         order = [_KINDS[kinds[name]] for name in names]

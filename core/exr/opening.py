@@ -51,7 +51,7 @@ def headers(path: Path) -> tuple[list[PartLayout], list[dict[str, Any]]]:
         parts = check_layout(data)
         return parts, [
             {
-                name.decode("utf-8", "replace"): value_of(kind, value)
+                name.decode(): value_of(kind, value)
                 for name, (kind, value) in part.attributes.items()
             }
             for part in parts
