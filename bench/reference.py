@@ -58,7 +58,9 @@ def render(scene: bpy.types.Scene, samples: int, seed: int, denoise: bool = Fals
     """Render the scene as it is, with that many samples, transparent, without clamping."""
     parts, seconds = render_passes(scene, samples, seed, denoise)
     combined = parts["Combined"]
-    index = np.rint(parts["Object Index"][..., 0]).astype(np.int32)
+    # Blender 4.5 names it otherwise
+    number = parts["Object Index"] if "Object Index" in parts else parts["IndexOB"]
+    index = np.rint(number[..., 0]).astype(np.int32)
     return Picture(combined[..., :3], combined[..., 3], index, seconds)
 
 

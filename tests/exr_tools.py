@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import struct
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+from arto.core import exr
 from arto.core.exr.head import parsed
 
 
@@ -31,6 +33,15 @@ def headers_of(path: Path) -> bytes:
     """The bytes of a file before its tables of chunks."""
     data = path.read_bytes()
     return data[: parsed(data)[1]]
+
+
+def digest(path: Path) -> list[str]:
+    """What is read of a file: its layers, their types and pixels; its first header."""
+    found = hashlib.sha256()
+    for name, pixels in exr.parts(path):
+        found.update(repr((name, pixels.dtype.str, pixels.shape)).encode())
+        found.update(np.ascontiguousarray(pixels).tobytes())
+    return [found.hexdigest(), repr(exr.header(path))]
 
 
 def damaged(sound: Sequence[bytes], count: int) -> Iterator[bytearray]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import pytest
 from arto.core import exr
 from arto.core.errors import ExrError
 from arto.core.exr.window import Window
-from exr_tools import damaged, headers_of, layers
+from exr_tools import damaged, digest, headers_of, layers
 from program_tools import Program
 
 # Reads all files of a folder and writes those that it finds as arrays. A file's digest tells its
@@ -48,14 +47,6 @@ found["left"] = len(list(Path("/proc/self/fd").iterdir())) - opened
 found["names"] = [exr.chosen().name, "OpenEXR" in sys.modules]
 (out / "found.json").write_text(json.dumps(found))
 """
-
-
-def digest(path: Path) -> list[str]:
-    found = hashlib.sha256()
-    for name, pixels in exr.parts(path):
-        found.update(repr((name, pixels.dtype.str, pixels.shape)).encode())
-        found.update(np.ascontiguousarray(pixels).tobytes())
-    return [found.hexdigest(), repr(exr.header(path))]
 
 
 @pytest.fixture(autouse=True)

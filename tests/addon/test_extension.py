@@ -10,8 +10,10 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+import OpenImageIO
 import pytest
 from arto.core import exr
+from exr_tools import digest
 
 from tools import package
 
@@ -31,6 +33,7 @@ from arto.core import exr
 from scene_tools import small_scene
 scene = small_scene(Path(out))
 scene.arto.samples, scene.arto.keep, scene.arto.layers = 4, "always", "FACES"
+scene.arto.write_data = True
 scene.arto.patterns, scene.arto.grain, scene.arto.far = "linear", False, False
 bpy.ops.wm.save_as_mainfile(filepath=str(Path(out, "scene.blend")))
 for step in (bpy.ops.arto.capture, bpy.ops.arto.fit, bpy.ops.arto.relight):
@@ -59,14 +62,16 @@ def test_the_files_of_the_zip_do_the_main_job(files: Path, tmp_path: Path) -> No
     assert done.returncode == 0, done.stdout + done.stderr
     said = next(n for n in done.stdout.splitlines() if n.startswith("FOUND"))
     assert json.loads(said.removeprefix("FOUND")) == ["OpenImageIO", True]
-    # and what it wrote, the package OpenEXR reads
-    before_that = exr.chosen()
-    exr.choose(exr.OpenExr())
-    try:
-        plate = exr.read(tmp_path / "relit.exr")[""]
-        layers = exr.read(next(tmp_path.glob("*layers*.exr")))
-    finally:
-        exr.choose(before_that)
+    # and what it wrote, both libraries read: plate, layers, data, and the capture that was kept
+    written, before_that, read = sorted(tmp_path.rglob("*.exr")), exr.chosen(), []
+    assert len(written) == 4
+    for library in (exr.OpenImageIo(OpenImageIO), exr.OpenExr()):
+        exr.choose(library)
+        read.append([digest(path) for path in written])
+    plate = exr.read(tmp_path / "relit.exr")[""]
+    layers = exr.read(next(tmp_path.glob("*layers*.exr")))
+    exr.choose(before_that)
+    assert read[0] == read[1]
     assert plate.shape == (18, 24, 4) and np.isfinite(plate).all() and plate[..., :3].mean() > 0.01
     sums = sum(layers[name] for name in layers if name)
     np.testing.assert_allclose(sums, plate[..., :3], atol=5e-3 * float(plate.max()))
