@@ -161,6 +161,8 @@ def difference(scene: bpy.types.Scene) -> float:
         seen = pixels.reshape(plate.shape)[::-1]
     finally:
         hand.close()
+    # the plate's file has half floats
+    seen = seen.astype(np.float16).astype(np.float32)
     off = np.abs(seen[..., :3] - plate[..., :3]).max()
     return float(off / plate[..., :3].mean())
 

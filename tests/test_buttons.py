@@ -165,6 +165,29 @@ def test_what_the_buttons_show(walk: Walk) -> None:
     assert (w.seconds - before) / (time.monotonic() - begun) < 0.1
 
 
+def test_finish_grows_until_it_is_stopped(walk: Walk) -> None:
+    """Each round is shown while the work goes on; the cross keeps it, and the button goes on."""
+    w = walk.w
+    w.do("scene.arto.compare, scene.arto.live_finish = 'OFF', False")
+    work(w, "relight")
+    plate = exr.read(walk.blend.with_name("scene_relit.exr"))[""]
+    press(w, "finish")
+    w.wait("space_of().image.name == 'ARTO Relit Finished'")
+    first = w.get("session.current.seen")
+    w.wait(f"session.current.seen != {first}")  # a second round was shown
+    press(w, "cancel")
+    level, text = w.idle()
+    assert level == "INFO" and "plate, which has" in text, text
+    finished = walk.blend.with_name("scene_relit_finished.exr")
+    before = int(exr.header(finished)["arto.finish samples"])
+    assert before >= 64
+    # the same picture, with other noise
+    assert np.abs(exr.read(finished)[""] - plate).mean() < 0.1 * plate.mean()
+    w.do(f"scene.arto.finish_samples = {before + 32}")
+    assert f"{before + 32} samples" in work(w, "finish")
+    assert int(exr.header(finished)["arto.finish samples"]) == before + 32
+
+
 TOLD = "told(scene).kind"
 # What the panel says of the shot, once the scene was looked at.
 STATE = """

@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 from bpy.app.handlers import persistent
 
+from ...core import exr
 from ...core.errors import ArtoError
 from ..blender.editors import reveal
 from ..job import session, snapshot
@@ -22,7 +23,7 @@ from ..plate.names import relit_file
 from ..plate.plate import name_of, show
 from ..plate.present import present, present_frames
 from ..relight import inside
-from ..relight.finished import FINISHED, finished_file
+from ..relight.finished import FINISHED, SAID, finished_file
 from ..relight.many import frames_of
 from ..relight.shown import newest
 from ..relight.verify import verify_file
@@ -134,7 +135,7 @@ def show_finished(job: SecondBlender) -> str:
         window = bpy.context.window_manager.windows[0]
         with bpy.context.temp_override(window=window):
             reveal(show(path, f"{name_of(scene)} {FINISHED}"))
-    return job.state.text
+    return f"finished with {exr.header(path).get(SAID, '')}" if path.is_file() else job.state.text
 
 
 def show_matched(job: SecondBlender) -> str:
