@@ -7,6 +7,7 @@ import bpy
 from .blender import exr_library
 from .job import session
 from .live import live
+from .resident import resident
 from .shot import scene_id, watch
 from .ui import (
     cli,
@@ -55,6 +56,7 @@ _MODULES = (
     scene_id,
     watch,
     session,
+    resident,
     live,
     thumbnails,
     strip,

@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import bpy
+from bpy.app.handlers import persistent
 
 
 @dataclass
@@ -59,12 +60,14 @@ def noted() -> Iterator[Interrupts]:
                     if renders[0]:
                         answer(signal.SIGINT)
 
+    @persistent  # the resident renderer opens a file meanwhile, which removes other handlers
     def begins(*_: object) -> None:
         with turn:
             renders[0] = True
             if told.came:
                 answer(signal.SIGINT)
 
+    @persistent
     def ends(*_: object) -> None:
         with turn:
             renders[0] = False

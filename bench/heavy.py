@@ -60,12 +60,17 @@ def counted() -> Iterator[Counted]:
     import bpy
 
     found = Counted()
+
+    @bpy.app.handlers.persistent  # a file that is opened meanwhile removes the others
+    def told(*arguments: object) -> None:
+        found.told(*arguments)
+
     handlers = bpy.app.handlers.render_stats
-    handlers.append(found.told)
+    handlers.append(told)
     try:
         yield found
     finally:
-        handlers.remove(found.told)
+        handlers.remove(told)
 
 
 def _measured(stage: str, work: Callable[[], Any]) -> Row:

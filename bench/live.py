@@ -18,6 +18,7 @@ from arto.arto_addon import shoot, work
 from arto.arto_addon.live import live
 from arto.arto_addon.live.image import IMAGE, put_away
 from arto.arto_addon.plate.names import relit_file
+from arto.arto_addon.resident import resident
 from arto.core import exr
 
 from . import scenes, worlds
@@ -30,7 +31,7 @@ DRAG, SINGLE = 5.0, 5
 FOLDER = Path(__file__).resolve().parent.parent / "out" / "live"
 
 
-def _shot(width: int, height: int, samples: int) -> bpy.types.Scene:
+def shot(width: int, height: int, samples: int) -> bpy.types.Scene:
     """The product shot, captured."""
     scene = scenes.product_shot(width=width, height=height)
     registered()
@@ -71,7 +72,7 @@ def _changes(scene: bpy.types.Scene) -> dict[str, Callable[[int], None]]:
     return {"turn": turn, "strength": strength, "node": node, "another HDRI": another}
 
 
-class _Hand:
+class Hand:
     """Ticks as the window's timer does, and counts the pictures that were shown."""
 
     def __init__(self, scene: bpy.types.Scene) -> None:
@@ -95,6 +96,22 @@ class _Hand:
         self.longest = max(self.longest, spent)
         time.sleep(max(0.0, live.EVERY - spent))
 
+    def clean(self) -> None:
+        """Until the picture is whole and denoised."""
+        self.rest()
+        until = time.perf_counter() + 120
+        while not self.live.is_clean:
+            self.tick()
+            if self.live.trouble or time.perf_counter() > until:
+                raise RuntimeError(self.live.trouble or f"not denoised: {self.live.line}")
+
+    def picture(self) -> np.ndarray:
+        """What is shown, (H, W, 4), rows top-down."""
+        image = bpy.data.images[IMAGE]
+        pixels = np.empty(len(image.pixels), np.float32)
+        image.pixels.foreach_get(pixels)
+        return pixels.reshape(image.size[1], image.size[0], 4)[::-1]
+
     def rest(self) -> None:
         """Until the whole picture is shown."""
         until = time.perf_counter() + 120
@@ -111,9 +128,10 @@ class _Hand:
         live.push = self._wrapped
         self.live.close()
         put_away(self.live.name)
+        resident.end(wait=True)
 
 
-def _measured(hand: _Hand, change: Callable[[int], None]) -> dict[str, float]:
+def _measured(hand: Hand, change: Callable[[int], None]) -> dict[str, float]:
     """Updates a second of a drag, seconds from a single change to its picture, and to the whole
     one."""
     first, whole = [], []
@@ -152,13 +170,10 @@ def difference(scene: bpy.types.Scene) -> float:
 
     work.run(compute(scene, scene.view_layers[0].name))
     plate = next(iter(exr.read(relit_file(scene)).values()))
-    hand = _Hand(scene)
+    hand = Hand(scene)
     try:
         hand.rest()
-        image = bpy.data.images[IMAGE]
-        pixels = np.empty(plate.size, np.float32)
-        image.pixels.foreach_get(pixels)
-        seen = pixels.reshape(plate.shape)[::-1]
+        seen = hand.picture()
     finally:
         hand.close()
     # the plate's file has half floats
@@ -171,11 +186,13 @@ def live_bench(sizes: list[str] | None, samples: int, out: Path) -> None:
     """Write the rows, and print them."""
     rows: list[dict[str, Any]] = []
     wanted = [tuple(map(int, s.split("x"))) for s in sizes] if sizes else list(SIZES)
+    from .live_suns import suns_rows
+
     for width, height in wanted:
         # a capture of full HD is of fewer samples: how long a picture takes hangs little on them
-        scene = _shot(width, height, samples if width < 1900 else max(4, samples // 4))
+        scene = shot(width, height, samples if width < 1900 else max(4, samples // 4))
         off = difference(scene)
-        hand = _Hand(scene)
+        hand = Hand(scene)
         try:
             hand.rest()
             for name, change in _changes(scene).items():
@@ -190,5 +207,6 @@ def live_bench(sizes: list[str] | None, samples: int, out: Path) -> None:
                 )
         finally:
             hand.close()
+        rows += suns_rows(scene)
         print(f"{width}x{height}: off the plate by {off:.1e} of its mean at most", flush=True)
     write_rows(out, rows)

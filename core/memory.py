@@ -51,6 +51,27 @@ def memory(root: Path = Path("/")) -> tuple[int, int | None]:
     return total, free
 
 
+def taken() -> int | None:
+    """Say how much memory this process takes.
+
+    Returns
+    -------
+    int or None
+        Bytes that are in the machine's memory; the most that the process ever took, on macOS. None
+        where the system does not say.
+    """
+    if sys.platform == "win32":
+        return _taken_windows()
+    with contextlib.suppress(OSError, IndexError, ValueError):
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+        return pages * os.sysconf("SC_PAGE_SIZE")
+    with contextlib.suppress(ImportError):
+        import resource
+
+        return int(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+    return None
+
+
 def ended_by(code: int) -> str:
     """Say how a process ended, in words.
 
@@ -132,3 +153,21 @@ def _windows() -> tuple[int, int | None]:
     status.length = ctypes.sizeof(Status)
     ctypes.windll.kernel32.GlobalMemoryStatusEx(ctypes.byref(status))  # type: ignore
     return int(status.total), int(status.free)
+
+
+def _taken_windows() -> int | None:
+    import ctypes
+
+    class Counters(ctypes.Structure):
+        _fields_ = (
+            ("size", ctypes.c_uint32), ("faults", ctypes.c_uint32),
+            *((n, ctypes.c_size_t) for n in ("peak", "taken", "a", "b", "c", "d", "e", "f")),
+        )  # fmt: skip
+
+    counters = Counters()
+    counters.size = ctypes.sizeof(Counters)
+    library = ctypes.windll.kernel32  # type: ignore
+    library.GetCurrentProcess.restype = ctypes.c_void_p
+    this = ctypes.c_void_p(library.GetCurrentProcess())
+    found = library.K32GetProcessMemoryInfo(this, ctypes.byref(counters), counters.size)
+    return int(counters.taken) if found else None

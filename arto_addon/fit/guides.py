@@ -58,10 +58,16 @@ def cleaned(scene: bpy.types.Scene, folder: Path) -> Steps[None]:
     if not guides:
         return
     yield Progress(0.99, "denoising the guides")
+    replace_layers(field, denoised(guides, scene))
+    write_head(folder, replace(field.head, about=replace(field.about, guides=CLEAN)))
+
+
+def denoised(guides: dict[str, NDArray], like: bpy.types.Scene | None) -> dict[str, NDArray]:
+    """Denoise guides, by name. like: the scene whose settings of the denoiser are used."""
+    found = {}
     for name, pixels in guides.items():
         # A normal is from -1 to 1, and the denoiser of pictures takes no numbers below 0.
         low, span = (-1.0, 2.0) if name == "normal" else (0.0, 1.0)
         noisy = ((pixels - low) / span).astype(np.float32)
-        guides[name] = denoise.denoise({}, noisy, like=scene) * span + low
-    replace_layers(field, guides)
-    write_head(folder, replace(field.head, about=replace(field.about, guides=CLEAN)))
+        found[name] = denoise.denoise({}, noisy, like=like) * span + low
+    return found

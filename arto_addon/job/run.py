@@ -71,6 +71,14 @@ def main(path: Path) -> int:
 
 
 def _steps(task: Task, folder: Path) -> Steps[Path | None]:
+    return VERBS[task.verb].steps(opened(task, folder), task.view_layer)
+
+
+def opened(task: Task, folder: Path) -> bpy.types.Scene:
+    """Make the open snapshot what the artist's file is in memory -> the task's scene.
+
+    folder: the snapshot's. Raises SceneError.
+    """
     home.set_file(task.blend)
     scene = home.of_library(bpy.data.scenes, task.scene, task.library)
     if scene is None:
@@ -86,7 +94,7 @@ def _steps(task: Task, folder: Path) -> Steps[Path | None]:
         if image is None:
             raise SceneError(f"the painted image '{painted.name}' is not in the copy of the file")
         put_pixels(image, folder / painted.pixels)
-    return VERBS[task.verb].steps(scene, task.view_layer)
+    return scene
 
 
 def _turn_paths(folder: Path) -> None:

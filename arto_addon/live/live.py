@@ -1,59 +1,56 @@
 """Live: while the switch is on, the shot follows its world.
 
-A timer looks at the world up to thirty times a second, and never does long work itself. A second
-Blender makes the maps of the world (`maps`). A thread makes the pictures (`viewer`).
+A timer looks at the world up to thirty times a second, and never does long work itself. The
+resident renderer makes the maps of the world (`maps`) and pictures of its suns (`suns`). A thread
+makes the pictures (`viewer`).
 
 While the artist changes the world, the pictures are small. After a short rest the picture has full
-size. After a longer rest a relight starts: its plate has the world's lamps and is denoised. Nobody
-asked for that relight, so it is a guest: whatever the artist does ends it. Where the plate on disk
-is of the light as it is now, the plate is shown, and not the live picture.
+size, and is denoised. After a longer rest a relight starts, whose plate has all its samples
+(`finishing`). Where the plate on disk is of the light as it is now, the plate is shown, and not the
+live picture.
 """
 
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ...core import exr
 from ...core.errors import ArtoError, SceneError
 from ..blender import handlers
 from ..blender.editors import redraw, reveal
 from ..blender.quitting import not_when_quitting, when_quitting
-from ..blender.words import tr
-from ..job import session
-from ..plate.names import relit_file
 from ..plate.plate import name_of
-from ..relight.light_key import HEADER, light_key
 from ..relight.shown import check_film
 from ..shot import watch
 from ..shot.shot import layer_of
 from ..world.check import check_world, world_of
 from ..world.kept import shows
 from ..world.own import gains_of
-from . import maps
+from .asking import WHOLE, Asking, Map
+from .finishing import Finishing
 from .image import Seen, push, put_away, seen, show_plate
 from .line import FINISHED_LINE, draft_line, lacking, line, other_shot
-from .quick import Quick
 from .source import Newest, Opened, place_of, source_of
-from .viewer import Viewer, Wish
+from .viewer import Drawn, Viewer, Wish
 from .wished import Light, Wished
 
 EVERY = 1 / 30
 # Seconds after which the world is looked at even if Blender reported no change: it may
 # report none for a world that is linked from another file.
 ANYWAY = 0.5
-# Seconds of rest until a picture of full size is made, and until a relight is started.
-WHOLE, FINISHED = 0.25, 2.0
+# Seconds of rest until a relight is started.
+FINISHED = 2.0
 
 
 class Live:
     """A shot that follows its world."""
 
     def __init__(self, scene: bpy.types.Scene, by_itself: bool = False) -> None:
-        """Open the shot's field, or its draft, and start the Blender that makes maps.
+        """Open the shot's field, or its draft, and start the resident renderer.
 
         by_itself: whether a capture switched Live on, to show its first picture. Raises what
         opening the field raises, and SceneError where the scene has no usable world.
@@ -66,7 +63,8 @@ class Live:
         self.by_itself = by_itself
         self.opened = Opened(scene, self.layer, source_of(scene, self.layer))
         self.viewer = Viewer(self.opened.preview)
-        self.maps, self.quick, self._seen = maps.Maps(), Quick(), Seen()
+        self.asking, self._seen = Asking(scene, self.layer, self.opened), Seen()
+        self.maps = self.asking.maps
         self._shot = place_of(scene)
         self.behind = True  # whether the world behind is in the picture
         # what Live has to say, why there is no map, and which film the shot was not captured for
@@ -77,17 +75,10 @@ class Live:
         self._now: Light | None = None
         self._changed = 0.0
         self._wished: Wished | None = None
-        self._asked_with = 1.0, 0.0
-        # the light for which a relight was started, and the relight while it runs
-        self._begun: Light | None = None
-        self.job: session.SecondBlender | None = None
-        # how long the last relight took, in seconds; why it failed
-        self.took: float | None = None
-        self.failed = ""
-        # whether the plate, which is of the light as it is now, is shown in place of the live image
-        self.finished = False
+        # the picture of full size that was made last
+        self._whole: Drawn | None = None
+        self.finishing = Finishing(self.layer)
         self.revealed = False
-        self.maps.start()
 
     @property
     def scene(self) -> bpy.types.Scene | None:
@@ -108,9 +99,12 @@ class Live:
         if self.dirty or now - self._looked > ANYWAY:
             self.dirty, self._looked = False, now
             self._look(scene, now)
-        self._follow_relight()
+        said, self._changed = self.finishing.follow(self._changed)
+        self.line = said or self.line
         self._wish(scene, now)
         shown = self.viewer.take()
+        if shown is not None and shown.shown is not None:
+            self._whole = shown
         if shown is not None and not self.finished:
             picture = np.repeat(np.repeat(shown.picture, shown.factor, 0), shown.factor, 1)
             self.name, (height, width) = name_of(scene), self.opened.size
@@ -120,12 +114,14 @@ class Live:
                 if not seen(image):
                     reveal(image)
             if not self.opened.draft:
-                lacks = lacking(scene, self.opened.held, self.behind, shown.suns)
-                self.line = line(scene, shown, lacks, self.took)
+                suns = shown.suns if shown.wish.suns is None else 0.0
+                lacks = lacking(scene, self.opened.held, self.behind, suns)
+                self.line = line(scene, shown, lacks, self.finishing.took)
             redraw()
             watch.redraw()
         said = self.maps.trouble_with(self._now.key) if self._now else ""
-        trouble = self.film or self.problem or said or self.viewer.trouble or self.failed
+        trouble = self.film or self.problem or said or self.viewer.trouble or self.finishing.failed
+        trouble = trouble or self.asking.suns.trouble
         if place_of(scene) != self._shot:
             trouble = other_shot(self._shot, place_of(scene))
         if trouble != self.trouble:
@@ -154,6 +150,8 @@ class Live:
             self.opened = found
             self.viewer.close(wait=False)
             self.viewer, self._wished, self._now = Viewer(found.preview), None, None
+            self._whole = None
+            self.asking.open(scene, found)
             self.dirty = True
         if self.opened.draft and self.line != (said := draft_line(*self._source.said)):
             self.line = said
@@ -175,11 +173,10 @@ class Live:
             self.film = str(e)
         if found == self._now:
             return
-        self._now, self._changed, self.failed = found, now, ""
-        if self.job is not None:
-            session.dismiss()  # the relight is of a light that is no longer wanted
-            self.job = None
-        was, self.finished = self.finished, self._is_finished(scene, world)
+        self._now, self._changed = found, now
+        was = self.finished
+        self.finishing.change(scene, world, self.opened)
+        self.asking.suns.make_way()
         if self.finished:
             self.name, self.line = name_of(scene), FINISHED_LINE
             show_plate(scene)
@@ -191,45 +188,51 @@ class Live:
         light = self._now
         if light is None or self.film:
             return
-        key, strength, turn = light.key, light.strength, light.turn
         rest = now - self._changed
         world = world_of(scene, self.layer)
-        full = self.maps.get(key, True)
-        image = full if full is not None else self.maps.get(key, False)
-        if image is None and world:
-            image = self.quick.map_of(world)
-            if image is not None:
-                self.maps.keep(key, image)
+        there = self.asking.map_of(world, light)
+        whole = self._whole if self.settled and not self.finished else None
         self.problem = ""
         try:
-            if world and not self.maps.busy:
-                if image is None and self.maps.ask(scene, self.layer, world, key, False):
-                    self._asked_with = strength, turn
-                elif image is not None and full is None and rest > WHOLE:
-                    self.maps.ask(scene, self.layer, world, key, True)
+            if world:
+                self.asking.ask(scene, world, light, rest, there, whole)
         except SceneError as e:  # between two HDRIs the world has none for a moment
             self.problem = str(e)
-        if image is None:
-            # the artist changes the world faster than maps are made: show the newest map meanwhile
-            newest = self.maps.newest
-            if newest is None or (self._wished and self._wished.key == newest[0]):
-                return
-            image = newest[1]
-            strength, turn = self._asked_with
-            wished = Wished(newest[0])
-        else:
-            wished = Wished(key, light, id(image), rest > WHOLE and full is not None)
-        if wished != self._wished:
-            self._wished = wished
-            gains = gains_of(scene)
-            view = self._seen.view(
-                scene, light.clear, world, key, self.opened.size, self.opened.region
-            )
-            self.behind = light.clear or view is not None
-            self.viewer.wish(Wish(image, strength, turn, light.own, gains, wished.whole, view))
-        finishes = light.finish and not self.opened.draft
-        if finishes and not self.finished and rest > FINISHED and self.settled:
-            self._finish(scene)
+        if there is not None:
+            self._show(scene, world, light, rest, there)
+        waits = rest > FINISHED and self.settled and not self.maps.busy
+        if light.finish and not self.opened.draft and not self.finished and waits:
+            self.finishing.start(scene, light)
+
+    def _show(
+        self,
+        scene: bpy.types.Scene,
+        world: bpy.types.World | None,
+        light: Light,
+        rest: float,
+        there: Map,
+    ) -> None:
+        """Wish for a picture of a map, where the picture is another than the last."""
+        suns, wait = self.asking.suns_of(scene, there)
+        if wait:
+            return  # without the suns their shadows would be blurred until then
+        full = there.ours and there.full and rest > WHOLE
+        clean = self.asking.clean_of(light) if full else None
+        ours = light if there.ours else None
+        wished = Wished(there.key, ours, id(there.image), full, id(suns), id(clean))
+        if wished == self._wished:
+            return
+        self._wished = wished
+        size, region = self.opened.size, self.opened.region
+        view = self._seen.view(scene, light.clear, world, there.key, size, region)
+        self.behind = light.clear or view is not None
+        gains = gains_of(scene)
+        wish = Wish(there.image, there.strength, there.turn, light.own, gains, full, view)
+        if suns is not None:
+            wish = replace(wish, suns=suns.pixels, of_suns=suns.factor)
+        if clean is not None and self._whole is not None and self._whole.shown is not None:
+            wish = replace(wish, clean=clean.pixels, alpha=self._whole.shown[..., 3:])
+        self.viewer.wish(wish)
 
     @property
     def settled(self) -> bool:
@@ -239,58 +242,40 @@ class Live:
             return False
         return wished.light == self._now and wished.whole and self.viewer.idle
 
-    def _finish(self, scene: bpy.types.Scene) -> None:
-        """Start the relight of the light that is shown, once for each light."""
-        if self._begun == self._now or session.current or bpy.app.is_job_running("RENDER"):
-            return
-        self._begun = self._now
-        self.job = session.start("relight", scene, self.layer, guest=True)
+    @property
+    def shows_suns(self) -> bool:
+        """Whether the newest picture of the suns is in the picture that was asked for last."""
+        wished, newest = self._wished, self.asking.suns.picture
+        return wished is not None and newest is not None and wished.suns == id(newest)
 
-    def _follow_relight(self) -> None:
-        """Say how far the relight is, or why it failed."""
-        job = self.job
-        if job is None:
-            return
-        if job.state.end:
-            self.job = None
-            if job.state.end == "failed":
-                self.failed = f"not finished: {job.state.text.splitlines()[0]}"
-        elif session.current is not job:
-            # whatever the artist pressed came first: the light is finished after it
-            self.job, self._begun, self._changed = None, None, time.monotonic()
-        else:
-            self.line = tr("Finishing, with suns and denoised: {share:.0%}", share=job.state.share)
+    @property
+    def is_clean(self) -> bool:
+        """Whether the picture of full size, of the world as it is now, is shown denoised."""
+        wished = self._wished
+        return self.settled and wished is not None and wished.clean != id(None)
 
     def relit(self, scene: bpy.types.Scene) -> bool:
         """A relight has ended -> whether its plate is to be shown: not if the light changed."""
         world = world_of(scene, self.layer)
         if scene != self.scene or world is None:
             return True
-        asked_for = self.job is None
-        if self.job is not None:
-            self.took, self.job = self.job.spent, None
-        self.finished = self._is_finished(scene, world)
-        if self.finished:
-            self.line = FINISHED_LINE
-        return self.finished or asked_for
-
-    def _is_finished(self, scene: bpy.types.Scene, world: bpy.types.World) -> bool:
-        """Whether the plate on disk is already of this light and this field, and to be shown."""
-        if not scene.arto.live_finish or self.opened.draft:
-            return False
-        try:
-            path = relit_file(scene)
-            same = exr.header(path).get(HEADER) == light_key(scene, world, self.layer)
-            return same and path.stat().st_mtime_ns >= self.opened.source.written
-        except (ArtoError, OSError):
-            return False
+        wanted, said = self.finishing.relit(scene, world, self.opened)
+        self.line = said or self.line
+        return wanted
 
     def close(self, wait: bool = True) -> None:
-        """End the thread, the second Blender and the relight. wait: until they have ended."""
+        """End the thread and the relight. wait: until the thread has ended.
+
+        The resident renderer stays, for when Live is switched on again.
+        """
         self.viewer.close(wait)
-        self.maps.close(wait)
-        if self.job is not None:
-            session.dismiss()
+        self.asking.close()
+        self.finishing.dismiss()
+
+    @property
+    def finished(self) -> bool:
+        """Whether the plate on disk is of the light as it is now, and is shown."""
+        return self.finishing.finished
 
 
 current: Live | None = None

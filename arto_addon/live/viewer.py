@@ -17,6 +17,7 @@ from ...core.light.lamps import split
 from ...core.light.light import PatchLight
 from ...core.preview import Preview
 from ...core.relight import over
+from ..resident.prepared import without_outlines
 
 # Seconds that a picture may take while the artist changes the world.
 MOVING = 0.06
@@ -30,7 +31,10 @@ class Wish:
     map; own: brightness of the scene's own lamps; gains: for each group of these lamps; resting:
     whether the picture has full size, however long it takes; view: for the world behind the scene,
     the direction of each pixel, (H, W, 3), 0 outside the render region, None where no world is seen
-    behind; at: when the picture was wished for, in seconds.
+    behind; suns: a render of the map's suns at strength 1, (h, w, 4) with its alpha, at 1 / of_suns
+    of the full size, None where the field shows them; clean: the picture of full size without the
+    world behind, (H, W, 3), where it was denoised; alpha: its alpha, (H, W, 1); at: when the
+    picture was wished for, in seconds.
     """
 
     image: NDArray[np.float32]
@@ -40,6 +44,10 @@ class Wish:
     gains: Mapping[str, float]
     resting: bool
     view: NDArray[np.float32] | None = None
+    suns: NDArray[np.float32] | None = None
+    of_suns: int = 1
+    clean: NDArray[np.float32] | None = None
+    alpha: NDArray[np.float32] | None = None
     at: float = field(default_factory=time.perf_counter)
 
 
@@ -49,7 +57,8 @@ class Drawn:
 
     picture: (h, w, 4) at 1 / factor of the full size, rows top-down; latency: seconds from the wish
     to the picture; suns: the share of the light of suns that a relight would render by themselves;
-    0 where there are none, and for pictures of less than the full size.
+    0 where there are none, and for pictures of less than the full size; shown: of full size, what
+    the field shows, (H, W, 4), without rendered suns and the world behind.
     """
 
     wish: Wish
@@ -57,6 +66,7 @@ class Drawn:
     factor: int
     latency: float
     suns: float = 0.0
+    shown: NDArray[np.float32] | None = None
 
 
 class Viewer:
@@ -129,12 +139,21 @@ class Viewer:
 
 def show(preview: Preview, wish: Wish) -> Drawn:
     """Work out the picture of a wish. Raises FieldError."""
-    image, factor = wish.image, 1
-    if not wish.resting:
-        image, factor = _coarse(image), preview.factor_for(MOVING)
+    factor = 1 if wish.resting else preview.factor_for(MOVING)
+    image = wish.image if wish.resting else _coarse(wish.image)
     environment = Environment(image * np.float32(wish.strength), wish.turn)
-    light = PatchLight(environment, preview.hemicube)
-    picture = preview.picture(light, factor, wish.own, wish.gains)
+    if wish.clean is not None and wish.alpha is not None:
+        shown = np.concatenate([wish.clean, wish.alpha], axis=-1)
+    else:
+        lit = environment
+        if wish.suns is not None:
+            rest = _rest(wish.image, wish.resting)
+            lit = Environment(rest * np.float32(wish.strength), wish.turn)
+        light = PatchLight(lit, preview.hemicube)
+        shown = preview.picture(light, factor, wish.own, wish.gains)
+    picture = shown.copy()
+    if wish.suns is not None and wish.clean is None:
+        _add(picture, factor, wish.suns, wish.of_suns, wish.strength)
     if wish.view is not None:
         # the direction in the middle of each of the larger pixels
         view = wish.view[factor // 2 :: factor, factor // 2 :: factor]
@@ -150,35 +169,74 @@ def show(preview: Preview, wish: Wish) -> Drawn:
             "the picture is infinite or not a number in some pixels: look what is so bright in the "
             "world, or capture again"
         )
-    suns = _suns(wish.image) if wish.resting else 0.0
-    return Drawn(wish, picture, factor, time.perf_counter() - wish.at, suns)
+    suns = _split(wish.image)[0] if wish.resting else 0.0
+    latency = time.perf_counter() - wish.at
+    return Drawn(wish, picture, factor, latency, suns, shown if wish.resting else None)
 
 
-# The last map whose suns were looked for, and their share: a turn or a strength does not change it.
-_lit: list[tuple[NDArray[np.float32], float]] = []
+def _add(
+    picture: NDArray[np.float32],
+    factor: int,
+    suns: NDArray[np.float32],
+    of_suns: int,
+    strength: float,
+) -> None:
+    """Add suns to a picture (h, w, 4) at 1 / factor of the full size. suns: see `Wish`."""
+    h, w = picture.shape[:2]
+    if of_suns > factor:
+        suns = suns.repeat(of_suns // factor, 0).repeat(of_suns // factor, 1)
+    elif of_suns < factor:
+        n = factor // of_suns
+        down, across = -suns.shape[0] % n, -suns.shape[1] % n
+        suns = np.pad(suns, ((0, down), (0, across), (0, 0)), mode="edge")
+        rows, columns = suns.shape[0] // n, suns.shape[1] // n
+        suns = suns.reshape(rows, n, columns, n, 4).mean(axis=(1, 3), dtype=np.float32)
+    h, w = min(h, suns.shape[0]), min(w, suns.shape[1])
+    light = without_outlines(suns[:h, :w], picture[:h, :w, 3])
+    picture[:h, :w, :3] += np.float32(strength) * light
 
 
-def _suns(image: NDArray[np.float32]) -> float:
-    """The share of a map's light that suns have which are worth a render; 0 for none."""
-    if not _lit or _lit[0][0] is not image:
-        found = split(Environment(image))
-        _lit[:] = [(image, found.share if found.worth else 0.0)]
-    return _lit[0][1]
+# The last maps whose suns were looked for: the share of the suns, 0 where they are not worth a
+# render, and the map without them. A turn or a strength does not change them.
+_splits: list[tuple[NDArray[np.float32], float, NDArray[np.float32]]] = []
 
 
-# The last map that was made coarser, and the result: while a world is turned its map is the same.
+def _split(image: NDArray[np.float32]) -> tuple[float, NDArray[np.float32]]:
+    """The share of a map's suns in its light, 0 for none, and the map without them, (H, W, 3)."""
+    for known, share, rest in _splits:
+        if known is image:
+            return share, rest
+    found = split(Environment(image))
+    _splits.append((image, found.share if found.worth else 0.0, found.rest.image))
+    del _splits[:-3]
+    return _splits[-1][1:]
+
+
+def _rest(image: NDArray[np.float32], resting: bool) -> NDArray[np.float32]:
+    """A map without its suns, coarse while the light moves -> (H, W, 3)."""
+    if resting:
+        return _split(image)[1]
+    known = next((rest for map_, _, rest in _splits if map_ is image), None)
+    # to look for the suns in a full map takes longer than a moving picture may
+    return _coarse(known) if known is not None else _split(_coarse(image))[1]
+
+
+# The last maps that were made coarser, and the results: while a world is turned its map is the
+# same.
 _last: list[tuple[NDArray[np.float32], NDArray[np.float32]]] = []
 COARSE = 512
 
 
 def _coarse(image: NDArray[np.float32]) -> NDArray[np.float32]:
     """A map with blocks of texels averaged, about `COARSE` texels across where the sizes divide."""
-    if _last and _last[0][0] is image:
-        return _last[0][1]
+    for known, out in _last:
+        if known is image:
+            return out
     height, width = image.shape[:2]
     scale = width // COARSE
     if scale < 2 or width % scale or height % scale:
         return image
     out = Environment(image).coarser(scale).image
-    _last[:] = [(image, out)]
+    _last.append((image, out))
+    del _last[:-2]
     return out

@@ -28,10 +28,13 @@ class Wished:
     """The picture that was asked for last.
 
     key: the world's; light: None where the map is of a world that has changed since; image: the
-    identity of the map; whole: whether the picture has full size.
+    identity of the map; whole: whether the picture has full size; suns: the identity of the picture
+    of the suns; clean: that of the clean picture.
     """
 
     key: str
     light: Light | None = None
     image: int = 0
     whole: bool = False
+    suns: int = 0
+    clean: int = 0

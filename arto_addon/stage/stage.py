@@ -56,6 +56,8 @@ class Stage:
         # Seconds in which small renders traced paths, and seconds of all threads.
         self.traced: tuple[float, ...] = (0.0, 0.0)
         self.scene_bytes = 0  # What Cycles says that the scene takes which it has prepared.
+        # Whether it matters that renders of the same samples have the same noise.
+        self.same_noise = True
         self._longest = 0  # The most samples that the scene which Cycles keeps was rendered with.
 
     def made(self, block: _Block) -> _Block:
@@ -95,7 +97,7 @@ class Stage:
         fewer samples, Cycles prepares the scene again: its noise is then that of such a render.
         """
         samples = self.scene.cycles.samples
-        if self.is_kept and max(samples, most) < self._longest:
+        if self.same_noise and self.is_kept and max(samples, most) < self._longest:
             self.renew()
         self._longest = max(self._longest, samples)
 

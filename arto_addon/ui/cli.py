@@ -28,11 +28,11 @@ from ..farm.part import render_part, save_part
 from ..farm.plan import plan
 from ..fit.fit import fit
 from ..job import run as job
-from ..live import maps
 from ..match.apply import match_and_apply
 from ..relight.finished import finish_plate
 from ..relight.many import relight_frames, relight_many
 from ..relight.relight import relight
+from ..resident import serve as resident
 from ..shot import home, paths, scene_id
 from ..shot.adopting import adopt, adopt_from
 from ..work import Batch, ProgressLines, Steps, run, strictly
@@ -72,8 +72,8 @@ def main(arguments: list[str]) -> int:
     verb = options.pop("verb")
     if verb == "job":
         return job.main(options["task"])
-    if verb == "maps":
-        return maps.serve()
+    if verb == "resident":
+        return resident.serve()
     try:
         if verb == "status":
             return _status(options)

@@ -136,7 +136,7 @@ def parser() -> argparse.ArgumentParser:
         )
     # these two are started by the window
     jobs.add_parser("job").add_argument("task", type=_path)
-    jobs.add_parser("maps")
+    jobs.add_parser("resident")
     return out
 
 

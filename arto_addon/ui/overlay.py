@@ -19,6 +19,7 @@ from ...core.light.light import PatchLight
 from ..capture import planes
 from ..live import live
 from ..live.maps import Maps
+from ..resident import resident
 from ..shot import paths, status
 from ..shot.shot import layer_of
 from ..world import kept
@@ -49,8 +50,7 @@ def switch(on: bool) -> None:
 
 def _put_out() -> None:
     bpy.types.SpaceView3D.draw_handler_remove(_handle.pop(), "WINDOW")
-    while _maps:
-        _maps.pop().close(wait=False)
+    _maps.clear()
     if bpy.app.timers.is_registered(_follow):
         bpy.app.timers.unregister(_follow)
 
@@ -76,7 +76,7 @@ def _follow() -> float | None:
         _redraw()
     elif live.current is None and map_of(scene) is None:
         if not _maps:
-            _maps.append(Maps())
+            _maps.append(Maps(resident.current()))
         # relighting reports a world that cannot light the scene; the overlay need not
         with contextlib.suppress(ArtoError):
             _maps[0].ask(scene, layer_of(scene), world, key[0], False)

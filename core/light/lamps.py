@@ -33,6 +33,8 @@ CONTRAST = 20.0
 # The share of all light from which on lamps are worth a render of their own.
 WORTH = 0.05
 _STEPS = 60
+# The least floor of a search, as a share of the mean.
+_LEAST = 1e-6
 
 
 @dataclass(frozen=True)
@@ -79,24 +81,36 @@ def split(
     Split
     """
     image = environment.image
-    radiance = np.maximum(image.sum(axis=-1, dtype=np.float64), 0)
+    radiance = image[..., 0].astype(np.float64)
+    for channel in (1, 2):  # numpy is slow at sums of three
+        radiance += image[..., channel]
+    np.maximum(radiance, 0, out=radiance)
     if hemicube is not None:
         height, width = radiance.shape
         radiance *= _covered(hemicube, height, width, environment.turn)
     weight = environment.row_solid_angles[:, None] / (4 * np.pi)
     total = float((radiance * weight).sum())
+    # No texel below this floor reaches the level, so only the brighter ones are looked at again.
+    floor = contrast * total / 2
+    while floor > 0 and contrast * float((np.minimum(radiance, floor) * weight).sum()) < floor:
+        floor = floor / 4 if floor > _LEAST * total else 0.0
+    bright = np.nonzero(radiance > floor)
+    among, weights = radiance[bright], weight[bright[0], 0]
+    below = total - float((among * weights).sum())
     level = np.inf
     for _ in range(_STEPS):
-        lower = contrast * float((np.minimum(radiance, level) * weight).sum())
+        lower = contrast * (below + float((np.minimum(among, level) * weights).sum()))
         if lower >= level * (1 - 1e-6):
             break
         level = lower
-    above = np.maximum(radiance - level, 0)
-    taken = np.divide(above, radiance, out=np.zeros_like(radiance), where=radiance > 0)
-    lamps = (image * taken[..., None]).astype(np.float32)
-    share = float((above * weight).sum()) / total if total > 0 else 0.0
+    above = np.maximum(among - level, 0)
+    taken = np.divide(above, among, out=np.zeros_like(among), where=among > 0)
+    lamps, rest = np.zeros_like(image, np.float32), image.copy()
+    lamps[bright] = image[bright] * taken[:, None]
+    rest[bright] -= lamps[bright]
+    share = float((above * weights).sum()) / total if total > 0 else 0.0
     turn = environment.turn
-    return Split(Environment(image - lamps, turn), Environment(lamps, turn), share)
+    return Split(Environment(rest, turn), Environment(lamps, turn), share)
 
 
 def _covered(hemicube: Hemicube, height: int, width: int, turn: float) -> NDArray[np.bool_]:

@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 from arto.arto_addon import shoot, work
 from arto.arto_addon.fit import fit
-from arto.arto_addon.live import live, maps, sent
+from arto.arto_addon.live import live, maps
 from arto.arto_addon.live.image import IMAGE, put_away
 from arto.arto_addon.live.viewer import Viewer, Wish
 from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.relight.relight import compute
+from arto.arto_addon.resident import resident, sent
 from arto.arto_addon.shot import paths, pixels
 from arto.arto_addon.world import kept
 from arto.arto_addon.world.dials import without_dials
@@ -49,6 +50,18 @@ def scene(tmp_path_factory):
     captured(scene)
     work.run(fit.fit(scene))
     return scene
+
+
+@pytest.fixture(autouse=True, scope="module")
+def ended():
+    """The second Blender serves all tests of this module."""
+    yield
+    resident.end(wait=True)
+
+
+@pytest.fixture
+def made() -> maps.Maps:
+    return maps.Maps(resident.current())
 
 
 @pytest.fixture
@@ -207,70 +220,65 @@ def _answer(made: maps.Maps, scene, key: str) -> str:
     return made.trouble_with(key)
 
 
-def test_a_killed_blender_is_said_and_another_one_is_started(scene) -> None:
-    made = maps.Maps()
-    try:
-        made.start()
-        made._process.kill()
-        made._process.wait(10)
-        assert _answer(made, scene, "one") == ""
-        assert made.get("one", False) is not None
-        # in the middle of a question
-        made.ask(scene, scene.view_layers[0].name, scene.world, "lost", False)
-        made._process.kill()
-        made._process.wait(10)
-        until = time.monotonic() + 240
-        while made.busy and time.monotonic() < until:
-            time.sleep(0.02)
-        assert made.get("lost", False) is not None or "ended" in made.trouble_with("lost")
-        assert _answer(made, scene, "two") == ""
-        assert made.get("two", False) is not None
-        # what failed is not asked for again and again
-        made._failed["three", False] = "why"
-        assert not made.ask(scene, scene.view_layers[0].name, scene.world, "three", False)
-        assert made.trouble_with("three") == "why" and made.trouble_with("two") == ""
-    finally:
-        made.close()
+def _kill() -> None:
+    process = resident.current().process
+    process.kill()
+    process.wait(10)
 
 
-def test_no_room_for_the_worlds_file(scene, tmp_path) -> None:
+def test_a_killed_blender_is_said_and_another_one_is_started(scene, made) -> None:
+    resident.current().begin()
+    _kill()
+    assert _answer(made, scene, "one") == ""
+    assert made.get("one", False) is not None
+    # in the middle of a question
+    made.ask(scene, scene.view_layers[0].name, scene.world, "lost", False)
+    _kill()
+    until = time.monotonic() + 240
+    while made.busy and time.monotonic() < until:
+        time.sleep(0.02)
+    assert made.get("lost", False) is not None or "ended" in made.trouble_with("lost")
+    assert _answer(made, scene, "two") == ""
+    assert made.get("two", False) is not None
+    # what failed is not asked for again and again
+    made._failed["three", False] = "why"
+    assert not made.ask(scene, scene.view_layers[0].name, scene.world, "three", False)
+    assert made.trouble_with("three") == "why" and made.trouble_with("two") == ""
+
+
+def test_no_room_for_the_worlds_file(scene, made, tmp_path) -> None:
     """A sentence, and it goes on once there is room again."""
-    made = maps.Maps()
-    folder, made._sent._folder = made._folder, tmp_path / "gone" / "far"
-    try:
-        with pytest.raises(SceneError, match="cannot be written"):
-            made.ask(scene, scene.view_layers[0].name, scene.world, "one", False)
-        assert not made.busy
-        made._sent._folder = folder
-        assert _answer(made, scene, "one") == ""
-    finally:
-        made.close()
+    folder, made._sent._folder = made._sent._folder, tmp_path / "gone" / "far"
+    with pytest.raises(SceneError, match="cannot be written"):
+        made.ask(scene, scene.view_layers[0].name, scene.world, "one", False)
+    assert not made.busy
+    made._sent._folder = folder
+    assert _answer(made, scene, "one") == ""
 
 
-def test_half_a_map_is_said(scene, monkeypatch) -> None:
-    made = maps.Maps()
-    try:
-        assert _answer(made, scene, "one") == ""
+def test_half_a_map_is_said(scene, made, monkeypatch) -> None:
+    assert _answer(made, scene, "one") == ""
 
-        def half(path, most):
-            raise ValueError(f"{path} is not what was written")
+    def half(path, most):
+        raise ValueError(f"{path} is not what was written")
 
-        monkeypatch.setattr(maps.arrays, "read", half)
-        assert "cannot be read" in _answer(made, scene, "two")
-        monkeypatch.undo()
-        assert _answer(made, scene, "three") == ""
-    finally:
-        made.close()
+    monkeypatch.setattr(maps.arrays, "read", half)
+    assert "cannot be read" in _answer(made, scene, "two")
+    monkeypatch.undo()
+    assert _answer(made, scene, "three") == ""
 
 
 def test_nothing_is_left(scene) -> None:
+    """Live switched off leaves the second Blender, for the next time; the file's end ends it."""
     before = {i.name for i in bpy.data.images}
     found = live.Live(scene)
     _rest(found)
-    folder, process = found.maps._folder, found.maps._process
+    beside = resident.current()
     found.close()
     put_away(found.name)
-    assert not folder.exists() and process.poll() is not None
+    assert beside.process.poll() is None
+    resident.end(wait=True)
+    assert not beside.folder.exists() and beside.process.poll() is not None
     assert {i.name for i in bpy.data.images} == before
 
 
@@ -286,19 +294,15 @@ def whole_map(made: maps.Maps, scene) -> np.ndarray:
     return found
 
 
-def test_maps_are_those_of_a_relight(scene) -> None:
+def test_maps_are_those_of_a_relight(scene, made) -> None:
     """What the other Blender makes is what this one makes, whole."""
-    made = maps.Maps()
-    try:
-        found = whole_map(made, scene)
-        with without_dials(scene, scene.view_layers[0].name, scene.world) as (plain, _, _):
-            expected = kept.environment(scene, 128, None, plain).image
-        np.testing.assert_array_equal(found, expected)
-    finally:
-        made.close()
+    found = whole_map(made, scene)
+    with without_dials(scene, scene.view_layers[0].name, scene.world) as (plain, _, _):
+        expected = kept.environment(scene, 128, None, plain).image
+    np.testing.assert_array_equal(found, expected)
 
 
-def test_a_packed_hdri_is_sent_once_for_each_change(scene, monkeypatch) -> None:
+def test_a_packed_hdri_is_sent_once_for_each_change(scene, made, monkeypatch) -> None:
     """And the map is that of a relight, kept by the same key."""
     monkeypatch.setattr(pixels, "FEW", 0)
     written, write = [], sent._write
@@ -309,7 +313,6 @@ def test_a_packed_hdri_is_sent_once_for_each_change(scene, monkeypatch) -> None:
     image = next(n.image for n in scene.world.node_tree.nodes if getattr(n, "image", None))
     painted = np.empty(len(image.pixels), np.float32)
     image.pixels.foreach_get(painted)
-    made = maps.Maps()
     try:
         for change in (1.0, 0.5):
             image.pixels.foreach_set(painted * np.tile(np.float32([change] * 3 + [1]), 64 * 32))
@@ -325,7 +328,6 @@ def test_a_packed_hdri_is_sent_once_for_each_change(scene, monkeypatch) -> None:
         kinds = [bpy.types.Image, bpy.types.World, bpy.types.World]
         assert written == 2 * kinds
     finally:
-        made.close()
         scene.world.arto.tint = (1, 1, 1)
         image.pixels.foreach_set(painted)
         image.pack()
@@ -356,7 +358,7 @@ def test_another_film_while_it_is_on(scene, on) -> None:
         scene.render.film_transparent, scene.world.arto.strength = True, 1.0
 
 
-def test_a_linked_world(tmp_path) -> None:
+def test_a_linked_world(tmp_path, made) -> None:
     """What is in another file lights live as it does here."""
     scene = small_scene(tmp_path)
     _hdri(scene)
@@ -367,12 +369,9 @@ def test_a_linked_world(tmp_path) -> None:
         into.worlds = ["World"]
     scene.world = into.worlds[0]
     assert scene.world.library
-    made, worlds = maps.Maps(), len(bpy.data.worlds)
-    try:
-        found = whole_map(made, scene)
-        np.testing.assert_array_equal(found, kept.environment(scene, 128).image)
-    finally:
-        made.close()
+    worlds = len(bpy.data.worlds)
+    found = whole_map(made, scene)
+    np.testing.assert_array_equal(found, kept.environment(scene, 128).image)
     assert len(bpy.data.worlds) == worlds
 
 

@@ -19,6 +19,7 @@ from arto.arto_addon.farm.templates import job_name
 from arto.arto_addon.job import snapshot
 from arto.arto_addon.live import maps
 from arto.arto_addon.plate.header import time_code
+from arto.arto_addon.resident import resident
 from arto.arto_addon.shot import home
 from arto.arto_addon.world.check import check_images
 from arto.core import arrays, exr
@@ -85,18 +86,19 @@ def _refused():
 def test_no_console_window_flashes(monkeypatch):
     monkeypatch.setattr(sys, "platform", "win32")
     started = []
-    monkeypatch.setattr(maps.subprocess, "Popen", lambda *_, **how: started.append(how))
-    made = maps.Maps()
+    monkeypatch.setattr(resident.subprocess, "Popen", lambda *_, **how: started.append(how))
+    beside = resident.Resident()
     monkeypatch.setattr(
-        maps.threading,
+        resident.threading,
         "Thread",
         lambda **_: SimpleNamespace(start=lambda: None, join=lambda *_: None),
     )
-    made.start()
+    beside.start()
     assert started[0]["creationflags"] & 0x08000000
     assert scripts.quietly()["creationflags"] == started[0]["creationflags"]
-    made._process = None
-    made.close()
+    monkeypatch.undo()
+    beside.process = None
+    beside.close()
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""A world in a file, on its way to the Blender that makes maps.
+"""A world in a file, on its way to the resident renderer.
 
 Large images that are packed into the artist's file are sent apart, each once for each change of it:
 a world is sent at every move of a slider.
@@ -6,6 +6,7 @@ a world is sent at every move of a slider.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -24,6 +25,8 @@ from ..world.still import is_restless, still
 # What stands in a world's file for an image that was sent apart: [its name, the file of the image,
 # the image's name].
 Apart = list[str]
+# A new name for each file: Blender does not read a library of a known name again.
+_numbers = itertools.count(1)
 
 
 class Sent:
@@ -34,7 +37,6 @@ class Sent:
         # by `session_uid`: what the image was then, and its file
         self._packed: dict[int, tuple[str, Path]] = {}
         self._painted: dict[int, str] = {}
-        self._number = 0
 
     def forget(self) -> None:
         """Send painted pixels again."""
@@ -47,9 +49,7 @@ class Sent:
 
         Raises SceneError.
         """
-        # a new name each time: Blender does not read a library of a known name again
-        self._number += 1
-        blend = self._folder / f"world{self._number}.blend"
+        blend = self._folder / f"world{next(_numbers)}.blend"
         with ExitStack() as held:
             if world.library or is_restless(world):
                 # a linked world is not written, and the other Blender does not have this scene
@@ -72,8 +72,7 @@ class Sent:
         if path is None or then != now:
             if path is not None:
                 marked.remove_file(path, "temporary")
-            self._number += 1
-            path = self._folder / f"image{uid}_{self._number}.blend"
+            path = self._folder / f"image{uid}_{next(_numbers)}.blend"
             _write(path, image)
             self._packed[uid] = now, path
         return path
@@ -155,8 +154,13 @@ def _images(tree: bpy.types.NodeTree | None) -> list[bpy.types.Image]:
     return [n.image for n in found if getattr(n, "image", None)]
 
 
-# In the Blender that makes maps: the images that were sent apart, by their files.
+# In the resident renderer: the images that were sent apart, by their files.
 _given: dict[str, str] = {}
+
+
+def forget() -> None:
+    """Let go of the names of images: another file was opened, which has none of them."""
+    _given.clear()
 
 
 def put_back(apart: list[Apart]) -> None:
