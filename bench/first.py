@@ -40,7 +40,7 @@ bpy.ops.wm.save_as_mainfile(filepath=path)
 
 # Clicks in the window, and writes down what was seen when.
 CLICK = """
-import json, sys, time
+import glob, json, os, sys, time
 import bpy
 
 out, whole = sys.argv[-2], sys.argv[-1] == "whole"
@@ -49,6 +49,23 @@ live, session, status, paths = (
     for name in ("live.live", "job.session", "shot.status", "shot.paths")
 )
 found, begun = {}, 0.0
+
+
+def work():
+    # seconds of all threads, of this process and of those that it has started
+    of = {}
+    for path in glob.glob("/proc/[0-9]*/stat"):
+        try:
+            with open(path) as file:
+                pid, rest = file.read().split(" (", 1)
+        except OSError:
+            continue
+        values = rest.rsplit(") ", 1)[1].split()
+        of[int(pid)] = int(values[1]), sum(map(int, values[11:15]))
+    ours = {os.getpid()}
+    while more := {pid for pid, (parent, _) in of.items() if parent in ours} - ours:
+        ours |= more
+    return sum(of[pid][1] for pid in ours if pid in of) / os.sysconf("SC_CLK_TCK")
 
 
 def note(name, value):
@@ -62,12 +79,14 @@ def look():
     now = time.perf_counter()
     window = bpy.context.window_manager.windows[0]
     if not begun:
-        begun = now
+        begun, found["work"] = now, work()
         with bpy.context.temp_override(window=window):
             bpy.ops.arto.shoot("INVOKE_DEFAULT")
         return 0.02
     job, on = session.current, live.current
     if on is not None and "ARTO Live" in bpy.data.images and on.opened.draft:
+        if "seconds" not in found:
+            note("cpu_seconds", work() - found["work"])
         note("seconds", now - begun)
         note("line", on.line)
         scene = bpy.context.scene
@@ -83,6 +102,7 @@ def look():
     if ended or (told and not whole):
         note("capture_seconds", now - begun if ended else job.state.spent + job.state.left)
         note("measured", ended)
+        note("capture_cpu", work() - found["work"])
         note("outcome", session.outcome.text if session.outcome else "")
         with open(out, "w") as file:
             json.dump(found, file)
@@ -102,8 +122,9 @@ def first(
 
     seconds: from the click to the first live picture; draft_seconds: to the larger draft;
     capture_seconds: of the whole, plate included, or what it told of itself where that is not
-    `measured`; limit: 10 s and what Cycles takes to prepare the scene. share: of each heavy scene's
-    triangles.
+    `measured`; limit: 10 s and what Cycles takes to prepare the scene; cpu_seconds, capture_cpu: of
+    all threads, until the first picture and until the end, which other programs on the machine
+    change less. share: of each heavy scene's triangles.
     """
     from tools import package
 
@@ -145,19 +166,22 @@ def _row(scene: str, size: tuple[int, int], samples: int, found: dict[str, Any])
         raise RuntimeError(f"'{scene}' showed nothing before its end: {found.get('outcome')}")
     ready = (found.get("pace") or [0.0])[0]
     names = ("seconds", "draft_seconds", "capture_seconds", "measured", "line")
+    names = (*names, "cpu_seconds", "capture_cpu")
     about = {"scene": scene, "width": size[0], "height": size[1], "samples": samples}
     return about | {n: found.get(n) for n in names} | {"prepared": ready, "limit": 10 + ready}
 
 
 def table(rows: list[Row]) -> str:
     """Markdown."""
-    head = ["scene", "size", "samples", "first picture, s", "draft, s", "capture, s", "limit, s"]
+    head = ["scene", "size", "samples", "first picture, s", "of threads", "draft, s"]
+    head += ["capture, s", "of threads", "limit, s"]
     lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     for r in rows:
         told = "" if r["measured"] else " (told)"
         draft = f"{r['draft_seconds']:.1f}" if r["draft_seconds"] else ""
         cells = [r["scene"], f"{r['width']}x{r['height']}", str(r["samples"])]
-        cells += [f"{r['seconds']:.1f}", draft, f"{r['capture_seconds']:.0f}{told}"]
+        cells += [f"{r['seconds']:.1f}", f"{r['cpu_seconds']:.1f}", draft]
+        cells += [f"{r['capture_seconds']:.0f}{told}", f"{r['capture_cpu']:.0f}" * r["measured"]]
         cells.append(f"{r['limit']:.1f}")
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)

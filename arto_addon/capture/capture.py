@@ -26,12 +26,12 @@ from ..shot import paths
 from ..shot.shot import shot_of
 from ..stage import takes
 from ..stage.stage import Stage
-from ..work import Progress, Render, Steps, Warned, Wrote
+from ..work import Progress, Render, Steps, Warned, Wrote, part_of
 from . import beside, draft, room
 from .around import Around, plan_of
 from .asked import Asked, asked, begun
 from .check import check_patterns, check_room_of, check_scene, incomplete_images
-from .plan import ALIGNED, strips_of
+from .plan import ALIGNED, finer, strips_of
 from .planned import Given, Planned
 from .resume import empty, empty_take, finish, finish_field, let_go, unfinished
 from .room import Estimate
@@ -134,11 +134,12 @@ def _capture(
             steps = _begun(this, folder, given)
             _, head = yield from draft.of_look(steps, this, claimed) if shows else steps
             empty(folder)
-        head = yield from _render_tiles(this.on, folder, head, shows)
+        part = 1 / (1 + len(takes.TAKES) * this.catchers)
+        head = yield from part_of(_render_tiles(this.on, folder, head, shows), 0.0, part)
     made = [(folder, claimed, head)]
-    for name in takes.TAKES if this.catchers else ():
+    for i, name in enumerate(takes.TAKES if this.catchers else ()):
         steps = _capture_beside(scene, view_layer, claimed / name, name, head, stopped)
-        found = yield from steps
+        found = yield from part_of(steps, (i + 1) * part, part)
         made += [found] if found else []
     # Put all takes in place at the end: until then an earlier capture stays whole. The first take
     # comes last: as long as it is unfinished, an interrupted end can be taken up again.
@@ -254,9 +255,11 @@ def _render_tiles(
                 on.renew()
                 t -= 1
                 continue
-            seconds = (head.seconds or 0.0) + time.perf_counter() - begun_at
+            took = time.perf_counter() - begun_at
+            seconds = (head.seconds or 0.0) + took
             done = {"files": tuple(files), "sums": sums_of(folder, files), "done": True}
             head = replace(head.with_tile(t, **done), seconds=seconds)
+            head = _finer(folder, head, t, took / entry.region.pixels, on)
             heads.write(folder, head)
             take(0.0)
             yield from fit(t)
@@ -267,6 +270,22 @@ def _render_tiles(
         if stream:
             stream.stop()
     return head
+
+
+def _finer(folder: Path, head: CaptureHead, number: int, pace: float, on: Stage) -> CaptureHead:
+    """The head with the tiles after one of this number cut finer, where they would take too long.
+
+    pace: seconds of a pixel of that tile. Work is kept at the end of each tile.
+    """
+    left = [tile.region for tile in head.tiles[number + 1 :]]
+    ready = on.pace.again if on.pace and on.is_kept else 0.0
+    cut = finer(left, pace, ready, number + 1)
+    if cut == left:
+        return head
+    for k in range(number + 1, len(head.tiles)):
+        for there in folder.glob(f"tile_{k:04d}*.exr"):  # of a process that was killed
+            marked.remove_file(there, "capture")
+    return replace(head, tiles=(*head.tiles[: number + 1], *map(TileEntry, cut)))
 
 
 def _in_halves(folder: Path, head: CaptureHead, number: int) -> CaptureHead | None:
@@ -291,6 +310,8 @@ def render_tile(
     """
     plan, tiles = plan_of(head), len(head.tiles)
     total = len(plan) * tiles
+    sizes = [tile.region.pixels for tile in head.tiles]
+    before, span = sum(sizes[:number]) / sum(sizes), sizes[number] / sum(sizes) / len(plan)
     files = []
     for i, images in enumerate(plan):
         at = number * len(plan) + i
@@ -299,7 +320,7 @@ def render_tile(
         # a killed process may have finished the file without noting it down
         if not is_whole(folder / name, images):
             around.set_tile(head, number, images)
-            work = Render(on.scene.name, at / total, text, 1 / total)
+            work = Render(on.scene.name, before + i * span, text, span)
             yield from _render(on, images, folder / name, work)
         files.append(name)
     return files

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 
 from ...core.capture.kinds import Route
@@ -53,6 +54,21 @@ def kept_often(tiles: list[Region], region: Region, seconds: float, ready: float
     return [
         Region(region.x, region.y + a, region.width, b - a) for a, b in itertools.pairwise(edges)
     ]
+
+
+def finer(tiles: list[Region], seconds_a_pixel: float, ready: float, others: int) -> list[Region]:
+    """Cut the tiles that are left where each would take longer than planned.
+
+    The machine may have become busier since the plan. seconds_a_pixel: as the last tile took them;
+    ready: see `kept_often`; others: how many tiles there are beside these.
+    """
+    most = 4 / 3 * max(KEPT, AT_MOST * ready)
+    out: list[Region] = []
+    for tile in tiles:
+        count = math.ceil(tile.pixels * seconds_a_pixel / most)
+        count = min(count, tile.height // (3 * ALIGNED))
+        out += strips_of(tile, count) if count > 1 else [tile]
+    return out if len(out) + others <= MOST_STRIPS else tiles
 
 
 def strips_of(region: Region, count: int) -> list[Region]:

@@ -121,6 +121,38 @@ def _turn_paths(folder: Path) -> None:
                 setattr(owner, prop.identifier, str(there))
 
 
+class Pace:
+    """How fast work goes on, and so how many seconds are left of it.
+
+    Other programs come and go, so the later half of the time counts, and not all of it.
+    """
+
+    def __init__(self) -> None:
+        self._seen: list[tuple[float, float]] = []
+
+    def begin(self, now: float, share: float) -> None:
+        """Count from here, if nothing was counted yet. share: how much is done, 0 to 1."""
+        self._seen = self._seen or [(now, share)]
+
+    def left(self, now: float, share: float) -> float | None:
+        """Seconds that are left; None where too little was seen. share: how much is done."""
+        if not self._seen:
+            return None
+        if now - self._seen[-1][0] >= 0.2:
+            self._seen.append((now, share))
+            if len(self._seen) > 4000:  # of hours, half as many looks will do
+                self._seen = self._seen[::2]
+        first = self._seen[0]
+        # the last look in the first half of the time, and of the work if that was shorter
+        half = [at for at in self._seen if at[0] <= (first[0] + now) / 2]
+        at, then = half[-1]
+        if share <= then:
+            at, then = first
+        if share <= then or now - at <= 0.5:
+            return None
+        return (now - at) / (share - then) * (1 - share)
+
+
 class _Told:
     """Listens to the window: a line ends the work, and so does the end of the pipe."""
 
@@ -155,7 +187,7 @@ class _Writer:
         self.begun = time.monotonic()
         self.share = 0.0
         self.text = "starting"
-        self._first: tuple[float, float] | None = None
+        self._pace = Pace()
         self._written = 0.0
         self.result = ""
         self._render: Render | None = None
@@ -168,9 +200,9 @@ class _Writer:
         self.share, self.text = min(step.share, 1.0), step.text
         if isinstance(step, Wrote):
             self.result = str(step.path)
-        if self._render and self._first is None:
+        if self._render and (step.share > 0 or self._render.span):
             # what an earlier run had done took no time in this one: count from here
-            self._first = time.monotonic(), step.share
+            self._pace.begin(time.monotonic(), step.share)
         self._write(soon=said != self.text)
         if said != self.text:
             print(f"ARTO job: {self.share:4.0%} {self.text}", flush=True)
@@ -180,11 +212,7 @@ class _Writer:
         if not soon and now - self._written < 1 / _OFTEN:
             return
         self._written = now
-        left = None
-        if self._first:
-            at, share = self._first
-            if self.share > share and now - at > 1:
-                left = (now - at) / (self.share - share) * (1 - self.share)
+        left = self._pace.left(now, self.share)
         with contextlib.suppress(
             OSError
         ):  # progress matters little: the work itself reports a full disk

@@ -6,9 +6,11 @@ import json
 import shutil
 import subprocess
 
+import numpy as np
 import pytest
 from arto.arto_addon import work
-from arto.arto_addon.capture import capture, planned
+from arto.arto_addon.capture import capture, plan, planned
+from arto.arto_addon.capture.plan import strips_of
 from arto.arto_addon.fit import fit
 from arto.arto_addon.shot import paths, status
 from arto.core.errors import ArtoError, CancelledError, CaptureSetError
@@ -179,3 +181,21 @@ def test_full_disk(tmp_path):
         assert captured(scene).read(0).basis.max() > 0
     finally:
         subprocess.run(["umount", str(small)], check=True)
+
+
+def test_tiles_are_cut_finer_where_they_take_longer_than_planned(tmp_path, monkeypatch):
+    """So about a minute is lost at most where the machine becomes busy; no bit changes."""
+    scene = small_scene(tmp_path)
+    scene.render.resolution_y, scene.arto.samples, scene.arto.far = 144, 2, False
+    scene.arto.patterns, scene.arto.grain = "white", False
+    monkeypatch.setattr(planned, "tiles_of", lambda r, n, m: strips_of(r, 2))
+    two = captured(scene)
+    basis = np.concatenate([two.read(t).basis for t in range(2)], axis=2)
+    monkeypatch.setattr(plan, "KEPT", 1e-6)
+    finer = captured(scene)
+    assert [region.height for region in finer.regions] == [72, 24, 24, 24]
+    cut = np.concatenate([finer.read(t).basis for t in range(4)], axis=2)
+    np.testing.assert_array_equal(cut, basis)
+    # and not where all is as it was planned
+    monkeypatch.setattr(plan, "KEPT", 1e6)
+    assert plan.finer(list(two.regions), 1.0, 0.0, 1) == list(two.regions)

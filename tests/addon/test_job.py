@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
@@ -11,6 +12,7 @@ import pytest
 from arto.arto_addon.blender import devices
 from arto.arto_addon.blender.devices import Devices
 from arto.arto_addon.job import run, snapshot
+from arto.arto_addon.job.run import Pace
 from arto.arto_addon.job.task import Painted, State, Task
 from arto.arto_addon.shot import home
 from arto.arto_addon.shot.fingerprint import changes, fingerprint
@@ -223,3 +225,26 @@ def test_times_in_few_words():
         "3 min 20 s",
         "2 h 5 min",
     ]
+
+
+def told(busy: Callable[[float], float]) -> list[tuple[float, float]]:
+    """What is told to be left of a work, and what is: every second. busy: how many times longer a
+    second of it takes, by how many seconds have passed."""
+    pace, now, share, said = Pace(), 0.0, 0.0, []
+    pace.begin(now, share)
+    while share < 1:
+        now += 0.25
+        share += 0.25 / 100 / busy(now)
+        if (left := pace.left(now, share)) is not None and now > 20:
+            said.append((now, left))
+    return [(left, now - at) for at, left in said if now - at > 10]
+
+
+def test_what_is_left_is_told_to_a_third_when_the_machine_becomes_busy_or_idle() -> None:
+    for busy in (lambda _: 1.0, lambda at: 1 + at / 200, lambda at: 1 + 0.5 * (at % 10 < 5)):
+        assert all(0.7 < left / then < 1.3 for left, then in told(busy))
+    # another program comes, and takes half of the machine: it is known as soon as it has run as
+    # long as all before
+    found = told(lambda at: 2.0 if at > 30 else 1.0)
+    late = [(left, then) for left, then in found if then < 110]
+    assert late and all(0.7 < left / then < 1.3 for left, then in late)
