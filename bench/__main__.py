@@ -10,6 +10,7 @@ from . import (
     finish_command,
     first,
     heavy_command,
+    kills,
     match_command,
     mirrors_command,
     place_command,
@@ -302,6 +303,7 @@ def main() -> int:
     mirrors_command.add(commands)
     first.add(commands)
     heavy_command.add(commands)
+    kills.add(commands)
     place_command.add(commands)
     finish_command.add(commands)
 
