@@ -6,15 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from . import (
-    finish_command,
-    first,
-    heavy_command,
-    kills,
-    match_command,
-    mirrors_command,
-    place_command,
-)
+from . import finish_command, heavy_command, match_command, mirrors_command, place_command
 
 
 def _demo(options: argparse.Namespace) -> None:
@@ -301,9 +293,7 @@ def main() -> int:
     c.set_defaults(run=_accuracy)
 
     mirrors_command.add(commands)
-    first.add(commands)
     heavy_command.add(commands)
-    kills.add(commands)
     place_command.add(commands)
     finish_command.add(commands)
 

@@ -1,10 +1,12 @@
-"""`python -m bench heavy`: its options, and what it does with them."""
+"""`python -m bench heavy`, and `first` and `kills`: what an artist waits for, and may lose."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 from typing import Any
+
+from . import first, kills
 
 
 def _heavy(options: argparse.Namespace) -> None:
@@ -20,7 +22,9 @@ def _heavy(options: argparse.Namespace) -> None:
 
 
 def add(commands: Any) -> None:
-    """Add the command to the parser of `python -m bench`."""
+    """Add the commands to the parser of `python -m bench`."""
+    first.add(commands)
+    kills.add(commands)
     c = commands.add_parser("heavy", help="heavy scenes: a capture beside a plain render")
     c.add_argument("--json", type=Path, default=Path("out/heavy.json"))
     c.add_argument("--scenes", nargs="+", help="scenes that begin so: '6 M' hair")
