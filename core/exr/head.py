@@ -176,7 +176,8 @@ def _attributes(data: mmap.mmap | bytes, at: int) -> tuple[Attributes, int]:
         if not name:
             return found, at
         kind, at = _text(data, at)
-        name.decode(), kind.decode()
+        for text in (name, kind):
+            text.decode()  # or it is no header that a library reads
         if at + 4 > len(data):
             break
         size = struct.unpack_from("<I", data, at)[0]

@@ -8,6 +8,8 @@ Examples
 
 from __future__ import annotations
 
+import ctypes
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,9 @@ from numpy.typing import NDArray
 from ..errors import ExrError
 from .head import PartLayout
 from .window import Box
+
+# A function of every library OpenEXR of version 3.
+_SYMBOL = "exr_get_library_version"
 
 
 class OpenExr:
@@ -91,12 +96,19 @@ class OpenExr:
 
 
 def _package() -> Any:
-    """The package. Raises ExrError where it is not installed."""
+    """The package. Raises ExrError where it is not installed, or where it could not work."""
+    # Only the loader of Linux gives a library another's symbols of the same name.
+    if sys.platform == "linux" and hasattr(ctypes.CDLL(None), _SYMBOL):
+        raise ExrError(
+            "this program has an OpenEXR of its own, beside which the package OpenEXR does not "
+            "work: choose the program's OpenImageIO (arto.core.exr.choose), as ARTO does when "
+            "Blender enables it"
+        )
     try:
         import OpenEXR
     except ImportError as e:
         raise ExrError(
-            "EXR files need the package OpenEXR for Python: install it (pip install OpenEXR), or "
-            "inside Blender choose Blender's own OpenImageIO (arto.core.exr.choose)"
+            "EXR files need the package OpenEXR for Python: install it (pip install OpenEXR). "
+            "Inside Blender enable ARTO, which chooses Blender's own OpenImageIO"
         ) from e
     return OpenEXR

@@ -80,6 +80,7 @@ def decoded(path: Path) -> tuple[list[dict[str, Any]], list[dict[str, NDArray]]]
     parts, heads = headers(path)
     if any(part.sampled for part in parts):
         raise ExrError(f"{path} has channels of different sizes: save it without subsampling")
+    check_name(path)
     channels = chosen().decode(path, parts)
     for part, found in zip(parts, channels, strict=True):
         shape = part.height, part.width
@@ -90,6 +91,27 @@ def decoded(path: Path) -> tuple[list[dict[str, Any]], list[dict[str, NDArray]]]
     except ExrError as e:
         raise ExrError(f"{path} is damaged, {e}: make it again") from None
     return heads, channels
+
+
+def check_name(path: Path) -> None:
+    """Check that a library can be told the name of a file.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    ExrError
+        The name is not UTF-8, as old archives leave them on Linux.
+    """
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        raise ExrError(
+            f"the name of {str(path)!a} is no UTF-8, so no library of EXR files can be given it: "
+            "rename the file or its folder"
+        ) from None
 
 
 def check_complete(path: Path) -> None:

@@ -31,7 +31,7 @@ from .attributes import encoded_head
 from .head import LayoutError
 from .layout import put_heads
 from .library import chosen
-from .opening import check_complete
+from .opening import check_complete, check_name
 from .window import FULL, Window
 
 # Gives a path to write to, and puts the file in its place when it is complete.
@@ -233,6 +233,7 @@ def _write(
 ) -> None:
     if len({plane.shape for _, planes in parts for plane in planes.values()}) > 1:
         raise ExrError(f"{path} was not written: its layers have different sizes")
+    check_name(path)
     parts, windows = window.put(parts)
     height, width = next(iter(parts[0][1].values())).shape
     whole_box = 0, 0, width - 1, height - 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import struct
 import sys
 from collections.abc import Iterator
@@ -170,6 +171,21 @@ def test_attributes_that_others_wrote_are_read_or_kept() -> None:
         b"preview": bytes(9), b"string ": b"\xff",
     }.items():  # fmt: skip
         assert encoded("a", decoded(kind, data)) == (kind, data)
+
+
+@pytest.mark.parametrize("name", LIBRARIES)
+def test_names_that_mean_something_to_a_library_are_names(tmp_path: Path, name: str) -> None:
+    """OpenImageIO has formats by endings, and options after a question mark."""
+    exr.choose(LIBRARIES[name])
+    given = {"a": np.ones((2, 3, 3), np.float32)}
+    for file in ("a?b=c.exr", "x.tif", "ä 日.EXR", "no ending", "a%04d#<UDIM>*.exr", "x.exr.part"):
+        if os.name == "nt" and set(file) & set('<>?*"|'):
+            continue
+        exr.write(tmp_path / file, given)
+        assert (tmp_path / file).is_file()
+        np.testing.assert_array_equal(exr.read(tmp_path / file)["a"], given["a"])
+    with pytest.raises(ExrError, match="is no UTF-8"):
+        exr.write(tmp_path / "\udcff.exr", given)
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="no list of open files here")
