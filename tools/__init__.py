@@ -1,1 +1,1 @@
-"""What makes the extension and its pictures: `tools.package`, `tools.walk`, `tools.screenshot`."""
+"""What makes the extension, the site and pictures: `package`, `site`, `walk`, `screenshot`."""
