@@ -9,7 +9,7 @@ from arto.arto_addon.blender.nodes import new_world
 from arto.arto_addon.blender.output import float_exr
 from arto.arto_addon.blender.reached import reached
 from arto.arto_addon.capture.check import check_scene
-from arto.arto_addon.live import sent
+from arto.arto_addon.resident import sent
 from arto.arto_addon.stage.settings import prepare
 from arto.arto_addon.stage.stage import stage
 from arto.arto_addon.world import images, kept
