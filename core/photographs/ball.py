@@ -136,7 +136,7 @@ def _refined(grey: NDArray, found: Point, step: int) -> Point:
     return x, y, radius
 
 
-def direction(grey: NDArray, circle: Point) -> Point:
+def direction(grey: NDArray, circle: Point, shape: tuple[int, int] | None = None) -> Point:
     """Find the direction of the lamp whose highlight is in a ball.
 
     The camera is far away: it sees the ball along one direction.
@@ -147,6 +147,8 @@ def direction(grey: NDArray, circle: Point) -> Point:
         Light of the picture in which only this lamp shines.
     circle : tuple of float
         x, y and radius of the ball.
+    shape : tuple of int, optional
+        (height, width) of the picture, of which `grey` has the rows around the ball.
 
     Returns
     -------
@@ -162,8 +164,9 @@ def direction(grey: NDArray, circle: Point) -> Point:
     height, width = grey.shape
     if not (radius >= 3 and radius <= x < width - radius and radius <= y < height - radius):
         raise PhotographsError(
-            f"the ball at {x:.0f}, {y:.0f} of radius {radius:.0f} is not all in the picture of "
-            f"{width} x {height}: say where it is in photographs.json ('ball')"
+            f"the ball of radius {radius:.0f} about column {x:.0f} is not all in the picture of "
+            f"{(shape or grey.shape)[1]} x {(shape or grey.shape)[0]}: say where it is in "
+            "photographs.json ('ball')"
         )
     top, left = int(y - radius), int(x - radius)
     piece = grey[top : int(y + radius) + 2, left : int(x + radius) + 2].astype(np.float64)

@@ -31,6 +31,10 @@ KNOTS = 256
 # How much smoothness counts beside the pixels: the most with which the pixels are explained as well
 # as with the least, but for this share. And the values that count, of black and of white.
 SMOOTH, AS_WELL = (1e4, 1e3, 1e2, 1e1, 1.0), 1.03
+# So many times the pixels are weighed anew by how far they are off.
+STEPS = 2
+# By how much worse one curve must explain three channels than a curve of each does.
+OTHERWISE = 1.3
 DARKEST, BRIGHTEST = 0.012, 0.985
 # In a picture without a curve the sensor ends at white.
 FULL = 0.995
@@ -127,19 +131,36 @@ def find(values: NDArray, times: NDArray, levels: int) -> Curve:
     P. Debevec and J. Malik, Recovering High Dynamic Range Radiance Maps from Photographs, 1997,
     equation 3.
     """
-    table = np.empty((3, KNOTS))
+    z = np.asarray(values, np.float64)
     logs = np.log(np.asarray(times, np.float64))
-    for c in range(3):
-        table[c] = _one(np.asarray(values[..., c], np.float64), logs, levels)
-    return Curve(table)
+    # a camera balances its channels before the curve, which is then one
+    table, left = _solved(np.concatenate([z[..., c] for c in range(3)]), logs, levels)
+    each = [_some_solved(z[..., c], logs, levels) for c in range(3)]
+    told = [(t, there) for t, there in each if t is not None]
+    if len(told) == 3 and left > OTHERWISE * float(np.mean([there for _, there in told])):
+        return Curve(np.stack([t for t, _ in told]))
+    return Curve(np.tile(table, (3, 1)))
 
 
-def _one(z: NDArray, logs: NDArray, levels: int) -> NDArray[np.float64]:
-    """The curve of one channel, (KNOTS,). z: (n, E)."""
+def _some_solved(
+    z: NDArray, logs: NDArray, levels: int
+) -> tuple[NDArray[np.float64] | None, float]:
+    """The curve of a channel, or None where it tells none."""
+    try:
+        return _solved(z, logs, levels)
+    except PhotographsError:
+        return None, 0.0
+
+
+def _solved(z: NDArray, logs: NDArray, levels: int) -> tuple[NDArray[np.float64], float]:
+    """The curve that some pixels tell, (KNOTS,), and what it leaves unexplained: an error of
+    logarithms.
+
+    z: (n, E).
+    """
     use = (z >= DARKEST) & (z <= BRIGHTEST)
-    some = use.sum(axis=1) >= 2
     spread = np.where(use, logs, -np.inf).max(1) - np.where(use, logs, np.inf).min(1)
-    some &= spread > 1e-3
+    some = (use.sum(axis=1) >= 2) & (spread > 1e-3)
     if not some.any():
         raise PhotographsError(
             "the camera's curve cannot be found: no pixel is between black and white in two "
@@ -148,46 +169,58 @@ def _one(z: NDArray, logs: NDArray, levels: int) -> NDArray[np.float64]:
         )
     z, use = z[some], use[some]
     x = np.linspace(0, 1, KNOTS)
-    # a value is sure to half a step, so its logarithm by the slope of sRGB's there
     s = np.log(np.maximum(_srgb(np.maximum(x, 0.5 / max(levels, 255))), 1e-6))
     place = np.clip(z, 0, 1) * (KNOTS - 1)
     low = np.minimum(place.astype(np.intp), KNOTS - 2)
     part = place - low
     weight = np.where(use, np.minimum(z, 1.2 * (1 - z)) ** 2, 0.0)
-    n, exposures = z.shape
-    hats = np.zeros((n * exposures, KNOTS))
-    rows = np.arange(n * exposures)
+    hats = np.zeros((z.size, KNOTS))
+    rows = np.arange(z.size)
     hats[rows, low.ravel()] = (1 - part).ravel()
     hats[rows, low.ravel() + 1] += part.ravel()
-    w = weight.ravel()
-    total = weight.sum(axis=1)
-    matrix = hats.T @ (w[:, None] * hats)
-    asked = hats.T @ (w * np.tile(logs, n))
-    # each pixel's own light is eliminated
-    each = (w[:, None] * hats).reshape(n, exposures, KNOTS).sum(axis=1)
-    matrix -= each.T @ (each / total[:, None])
-    asked -= each.T @ ((weight @ logs) / total)
     # second differences against s, by distances that differ: a power of light has none
-    step = np.diff(s)
-    step = np.maximum(step, 1e-9)
+    step = np.maximum(np.diff(s), 1e-9)
     bend = np.zeros((KNOTS - 2, KNOTS))
     at = np.arange(KNOTS - 2)
     bend[at, at] = 1 / step[:-1]
     bend[at, at + 1] = -1 / step[:-1] - 1 / step[1:]
     bend[at, at + 2] = 1 / step[1:]
     bend *= np.sqrt(np.minimum(step[:-1], step[1:]))[:, None]
+    smooth = bend.T @ bend / KNOTS
+    for _ in range(STEPS):
+        found, left = _smoothest(hats, weight, logs, smooth)
+        off = (hats @ found).reshape(z.shape) - logs
+        total = np.maximum(weight.sum(axis=1, keepdims=True), 1e-12)
+        off -= (weight * off).sum(axis=1, keepdims=True) / total
+        usual = max(float(np.median(np.abs(off[weight > 0]))), 0.5 / max(levels, 255))
+        # what moved, or lies across an edge, is far off and does not count
+        weight = weight / (1 + (off / (4 * usual)) ** 2)
+    light = np.exp(np.maximum.accumulate(found - found[-1]))
+    light[0] = 0.0  # black is no light
+    return np.maximum.accumulate(light), left
+
+
+def _smoothest(
+    hats: NDArray, weight: NDArray, logs: NDArray, smooth: NDArray
+) -> tuple[NDArray[np.float64], float]:
+    """The smoothest curve that explains the pixels nearly as well as any, and its error."""
+    w = weight.ravel()
+    n, exposures = weight.shape
+    total = np.maximum(weight.sum(axis=1), 1e-12)
+    matrix = hats.T @ (w[:, None] * hats)
+    asked = hats.T @ (w * np.tile(logs, n))
+    # each pixel's own light is eliminated
+    each = (w[:, None] * hats).reshape(n, exposures, KNOTS).sum(axis=1)
+    matrix -= each.T @ (each / total[:, None])
+    asked -= each.T @ ((weight @ logs) / total)
     # the curve is 0 at white; nothing else tells the exposure from the light
     matrix[-1, -1] += 1e3 * w.sum()
-    smooth = w.sum() / KNOTS * (bend.T @ bend)
-    found = [np.linalg.solve(matrix + much * smooth, asked) for much in SMOOTH]
+    found = [np.linalg.solve(matrix + much * w.sum() * smooth, asked) for much in SMOOTH]
     square = float(w @ np.tile(logs, n) ** 2 - ((weight @ logs) ** 2 / total).sum())
     left = np.array([square - 2 * asked @ g + g @ matrix @ g for g in found])
-    g = found[int(np.argmax(left <= AS_WELL**2 * left.min()))]
-    g = np.maximum.accumulate(g - g[-1])
-    light = np.exp(g)
-    # black is no light
-    light[0] = 0.0
-    return np.maximum.accumulate(light)
+    left = np.sqrt(np.maximum(left, 0) / w.sum())
+    best = int(np.argmax(left <= AS_WELL * left.min() + 1e-6))
+    return found[best], float(left[best])
 
 
 def merged(

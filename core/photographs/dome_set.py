@@ -25,7 +25,6 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -145,7 +144,7 @@ def write(
     photos.check_light()
     count, (height, width) = len(said.lamps), photos.shape
     taking = _Taking(photos)
-    found = lamps_of_dome.found(photos, lru_cache(maxsize=2)(taking.of))
+    found = lamps_of_dome.found(photos, taking.rows)
     hemicube = found.hemicube(said.view, said.reach)
     omega = hemicube.solid_angles[:, None]
     level = 1.0 if found.absolute else _level(taking, found, omega)
@@ -201,10 +200,10 @@ def small_pictures(
     step = max(1, int(np.sqrt(height * width * count / (16 * most))))
     pictures = []
     for k in range(count):
-        light, bright = taking.rows(k, 0, height)
+        light, bright = lamps_of_dome.small(taking.rows, k, photos.shape, step)
         light[bright] = np.nan
-        pictures.append(light[::step, ::step])
-    return np.stack(pictures), taking.alpha(0, height)[::step, ::step]
+        pictures.append(light)
+    return np.stack(pictures), taking.small_alpha(step)
 
 
 def _write_tile(
@@ -226,11 +225,11 @@ def _level(taking: _Taking, found: Lamps, omega: NDArray) -> float:
     """What makes the picture in a white world as bright as pictures are."""
     height, width = taking.shape
     step = max(1, int(np.sqrt(height * width / SMALL)))
-    total = np.zeros((-(-height // step), -(-width // step), 3))
+    total: NDArray | float = 0.0
     for k in range(len(found.directions)):
-        total += taking.of(k)[::step, ::step] * (omega[k] / found.strengths[k])
-    grey = np.nan_to_num(total.mean(axis=-1))
-    grey = grey[taking.alpha(0, height)[::step, ::step] > 0.5]
+        light, _ = lamps_of_dome.small(taking.rows, k, taking.shape, step)
+        total = total + light * (omega[k] / found.strengths[k])
+    grey = np.mean(total, axis=-1)[taking.small_alpha(step) > 0.5]
     bright = float(np.percentile(grey, OF_PIXELS)) if grey.size else 0.0
     if bright <= 0:
         raise PhotographsError(
@@ -249,8 +248,12 @@ class _Taking:
         self.ambient, self.dark = said.of(Kind.AMBIENT), said.of(Kind.DARK)
         self.masks, self.empty = said.of(Kind.MASK), said.of(Kind.EMPTY)
 
-    def of(self, k: int) -> NDArray[np.float32]:
-        return self.rows(k, 0, self.shape[0])[0]
+    def small_alpha(self, step: int) -> NDArray[np.float32]:
+        """The alpha of every n-th pixel of every n-th row."""
+        height, width = self.shape
+        at_once = max(1, lamps_of_dome.STRIP // (width * step)) * step
+        parts = (self.alpha(y, min(y + at_once, height)) for y in range(0, height, at_once))
+        return np.concatenate([part[::step, ::step] for part in parts])
 
     def rows(self, k: int, first: int, last: int) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
         """The light of one lamp, and where it is saturated."""

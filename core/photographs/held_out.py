@@ -27,6 +27,8 @@ from .lamps import Lamps
 
 # Lamps that have to be left to predict one.
 FEWEST = 3
+# A lamp that next to nothing of is seen is judged by this share of the mean lamp's light.
+DIM = 0.1
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,8 @@ class Row:
     apart : float
         Degrees to the nearest other lamp.
     error : float
-        The mean difference, over the mean light of the lamp's picture.
+        The mean difference, over the mean light of the lamp's picture; of a lamp that is hardly
+        seen, over a share of the mean light of all lamps' pictures.
     nearest : float
         The same for the picture of the nearest lamp, taken as it is.
     gain : float
@@ -120,13 +123,14 @@ def held_out(
     flat = np.nan_to_num(pictures.reshape(count, -1).astype(np.float64))
     share = np.repeat(where.ravel(), 3)
     rows, worst, most = [], np.zeros((0, 0, 3)), -1.0
+    least = max(DIM * float((flat @ share).mean()), 1e-30)
     for k in range(count):
         others = np.delete(np.arange(count), k)
         found = sphere.weights(directions[others], directions[k : k + 1])[0] @ flat[others]
         found = np.maximum(found, 0)
         cosines = directions[others] @ directions[k]
         nearest = flat[others[int(cosines.argmax())]]
-        total = max(float(share @ flat[k]), 1e-30)
+        total = max(float(share @ flat[k]), least)
         error = float(share @ np.abs(found - flat[k])) / total
         rows.append(
             Row(
@@ -134,7 +138,7 @@ def held_out(
                 float(np.degrees(np.arccos(np.clip(cosines.max(), -1, 1)))),
                 error,
                 float(share @ np.abs(nearest - flat[k])) / total,
-                total / max(float(share @ found), 1e-30),
+                float(share @ flat[k]) / max(float(share @ found), least),
             )
         )
         if error > most:

@@ -31,6 +31,10 @@ GRAZES = 0.15
 # The direction to a near lamp is taken for one in a block: so many across the picture, of at least
 # so many pixels a side.
 ACROSS, BLOCK = 32, 8
+# Pixels in which a ball is looked for, and that are read at a time where few are kept.
+LOOKED, STRIP = 1 << 21, 1 << 22
+
+Rows = Callable[[int, int, int], tuple[NDArray, NDArray[np.bool_]]]
 
 
 @dataclass(frozen=True)
@@ -139,14 +143,15 @@ class Near:
     turned: NDArray[np.float64]
 
 
-def found(photos: Photographs, small: Callable[[int], NDArray]) -> Lamps:
+def found(photos: Photographs, rows: Rows) -> Lamps:
     """Find where the lamps are and how strong.
 
     Parameters
     ----------
     photos : Photographs
-    small : callable
-        Gives the light of a lamp's photographs, whole, without what is there without the lamp.
+    rows : callable
+        Gives the light of a lamp's photographs in rows from a first to a last, which is left out,
+        without what is there without the lamp; and where it is saturated.
 
     Returns
     -------
@@ -161,7 +166,7 @@ def found(photos: Photographs, small: Callable[[int], NDArray]) -> Lamps:
     count = len(said.lamps)
     given = [lamp.place or lamp.direction for lamp in said.lamps]
     if any(where is None for where in given):
-        given = [where or one for where, one in zip(given, _by_ball(photos, small), strict=True)]
+        given = [where or one for where, one in zip(given, _by_ball(photos, rows), strict=True)]
     directions = np.array(given, np.float64)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     places = None
@@ -182,7 +187,7 @@ def found(photos: Photographs, small: Callable[[int], NDArray]) -> Lamps:
         raise PhotographsError(
             f"the white target at {x}, {y} of {w} x {h} is not in the picture of {width} x {height}"
         )
-    target = np.stack([_median(small(k)[y : y + h, x : x + w]) for k in range(count)])
+    target = np.stack([_median(*rows(k, y, y + h), x, x + w) for k in range(count)])
     # the target faces the camera
     middle = np.array([x + w / 2 - width / 2, height / 2 - y - h / 2, 0]) * out.span / width
     away = directions if places is None else places - middle
@@ -203,23 +208,58 @@ def found(photos: Photographs, small: Callable[[int], NDArray]) -> Lamps:
     return replace(out, strengths=sent, absolute=True)
 
 
-def _median(piece: NDArray) -> NDArray[np.float64]:
-    return np.nanmedian(piece.reshape(-1, 3), axis=0)
+def _median(
+    light: NDArray, bright: NDArray[np.bool_], first: int, last: int
+) -> NDArray[np.float64]:
+    """The light (3,) of some columns. Raises PhotographsError where it is saturated."""
+    if bright[:, first:last].mean() > 0.5:
+        raise PhotographsError("the white target is saturated: photograph with a shorter exposure")
+    return np.median(light[:, first:last][~bright[:, first:last]], axis=0)
 
 
-def _by_ball(photos: Photographs, small: Callable[[int], NDArray]) -> list[tuple[float, ...]]:
+def _by_ball(photos: Photographs, rows: Rows) -> list[tuple[float, ...]]:
     """The lamps' directions by their highlights in a chrome ball."""
-    count = len(photos.said.lamps)
-
-    def grey(k: int) -> NDArray:
-        light = small(k)
-        # a highlight that is saturated is as bright as anything
-        return np.where(np.isfinite(light), light, np.nanmax(light, initial=0)).sum(axis=-1)
-
+    count, (height, width) = len(photos.said.lamps), photos.shape
     circle = photos.said.ball
     if circle is None:
-        circle = ball.find(np.mean([grey(k) for k in range(count)], axis=0))
-    return [ball.direction(grey(k), circle) for k in range(count)]
+        step = max(1, int(np.sqrt(height * width / LOOKED)))
+        mean = sum(small(rows, k, photos.shape, step)[0].sum(axis=-1) for k in range(count))
+        x, y, radius = ball.find(np.asarray(mean))
+        circle = (x * step, y * step, radius * step)
+    x, y, radius = circle
+    first, last = max(0, int(y - radius) - 2), min(height, int(y + radius) + 4)
+    inside = (x, y - first, radius)
+    # a highlight that is saturated is as bright as anything
+    return [
+        ball.direction(rows(k, first, last)[0].sum(axis=-1), inside, (height, width))
+        for k in range(count)
+    ]
+
+
+def small(
+    rows: Rows, k: int, shape: tuple[int, int], step: int
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Read every n-th pixel of every n-th row, without more memory than some rows take.
+
+    Parameters
+    ----------
+    rows : callable
+        As of `found`.
+    k : int
+        The number of the lamp.
+    shape : tuple of int
+        (height, width) of the picture.
+    step : int
+
+    Returns
+    -------
+    light : (h, w, 3) float32
+    saturated : (h, w) bool
+    """
+    at_once = max(1, STRIP // (shape[1] * step)) * step
+    parts = [rows(k, y, min(y + at_once, shape[0])) for y in range(0, shape[0], at_once)]
+    light, bright = zip(*((a[::step, ::step], b[::step, ::step]) for a, b in parts), strict=True)
+    return np.concatenate(light), np.concatenate(bright)
 
 
 def check_lit(said: Description) -> None:

@@ -34,7 +34,7 @@ from .shift import Shift, edges, middle, put_back, shift_of
 # Exposures nearer than this ratio are one.
 SAME = 1.02
 # Groups of exposures that tell the curve, pixels of each, and rows read of a large picture.
-GROUPS, PIXELS, ROWS = 12, 300, 512
+GROUPS, PIXELS, ROWS = 8, 100, 512
 # Pixels of a picture that are looked at whole.
 SMALL = 1 << 22
 
@@ -257,17 +257,20 @@ class Photographs:
         self.moved = {}
         lit = [p for p in self.said.photographs if p.kind not in (Kind.MASK, Kind.STEP, Kind.DARK)]
         every = list(groups(lit).values())
-        rows, columns = middle(self.shape)
+        rows, columns = middle(self.shape, len(every))
         best: list[Photograph] = []
         own: dict[str, NDArray] = {}
         for number, group in enumerate(every):
-            seen = {p.file: self._pictures[p.file].rows(rows.start, rows.stop) for p in group}
+            seen = {
+                p.file: self._pictures[p.file].rows(rows.start, rows.stop)[:, columns].copy()
+                for p in group
+            }
             one = max(group, key=lambda p: _shows(seen[p.file]))
             best.append(one)
-            own[one.file] = self._edges(seen[one.file], columns)
+            own[one.file] = self._edges(seen[one.file])
             for photo in group:
                 if photo is not one and _shows(seen[photo.file]) > 0.02:
-                    there = self._edges(seen[photo.file], columns)
+                    there = self._edges(seen[photo.file])
                     self._note(photo, shift_of(own[one.file], there))
             yield 0.8 * (number + 1) / len(every)
         for _ in range(2):
@@ -295,8 +298,8 @@ class Photographs:
         if shift.moved:
             self.moved[photo.file] = shift
 
-    def _edges(self, values: NDArray, columns: slice) -> NDArray[np.float64]:
-        return edges(self.curve.light(values[:, columns]).sum(axis=-1))
+    def _edges(self, values: NDArray) -> NDArray[np.float32]:
+        return edges(self.curve.light(values).sum(axis=-1)).astype(np.float32)
 
     def check_light(self) -> None:
         """Check that the photographs show something.

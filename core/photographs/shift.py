@@ -21,12 +21,14 @@ from numpy.typing import NDArray
 
 # Pixels a side of what is compared: a piece from the middle of a larger picture.
 SIDE = 1024
+# Pixels of all pictures together.
+MOST = 1 << 26
 # A shift larger than this share of the picture's side is not believed.
 FARTHEST = 0.1
 # By how much better edges must agree, as a correlation, for a shift to be believed.
-BETTER = 0.04
+BETTER = 0.1
 # The least correlation of edges that are of one thing.
-ALIKE = 0.15
+ALIKE = 0.25
 
 
 @dataclass(frozen=True)
@@ -75,20 +77,23 @@ def edges(grey: NDArray) -> NDArray[np.float64]:
     return np.minimum(size, top)
 
 
-def middle(shape: tuple[int, int]) -> tuple[slice, slice]:
+def middle(shape: tuple[int, int], count: int = 1) -> tuple[slice, slice]:
     """Choose the piece of pictures that is compared.
 
     Parameters
     ----------
     shape : tuple of int
         (height, width).
+    count : int
+        How many pictures there are: of many, less of each is in memory.
 
     Returns
     -------
     tuple of slice
         Rows and columns.
     """
-    rows, columns = (slice((n - min(n, SIDE)) // 2, (n + min(n, SIDE)) // 2) for n in shape)
+    side = min(SIDE, max(64, int(np.sqrt(MOST / count))))
+    rows, columns = (slice((n - min(n, side)) // 2, (n + min(n, side)) // 2) for n in shape)
     return rows, columns
 
 

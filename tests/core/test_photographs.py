@@ -282,7 +282,9 @@ def test_a_chrome_ball_tells_the_lamps(tmp_path: Path) -> None:
         photos.append(Photograph(f"{k}", Kind.LIGHT, lamp=k))
     said = Description(tuple(photos), (Lamp(),) * 8)
     there = opened(said, pictures)
-    found = lamps.found(there, lambda k: there.light(there.group(Kind.LIGHT, lamp=k)))
+    found = lamps.found(
+        there, lambda k, a, b: there.measured(there.group(Kind.LIGHT, lamp=k), a, b)
+    )
     cosines = (found.directions * directions).sum(axis=1)
     assert np.degrees(np.arccos(np.clip(cosines, -1, 1))).max() < 2.0
     plain: dict[str, Picture] = {
