@@ -32,7 +32,7 @@ KNOTS = 256
 # as with the least, but for this share. And the values that count, of black and of white.
 SMOOTH, AS_WELL = (1e4, 1e3, 1e2, 1e1, 1.0), 1.03
 # So many times the pixels are weighed anew by how far they are off.
-STEPS = 2
+STEPS = 1
 # By how much worse one curve must explain three channels than a curve of each does.
 OTHERWISE = 1.3
 DARKEST, BRIGHTEST = 0.012, 0.985
@@ -187,14 +187,15 @@ def _solved(z: NDArray, logs: NDArray, levels: int) -> tuple[NDArray[np.float64]
     bend[at, at + 2] = 1 / step[1:]
     bend *= np.sqrt(np.minimum(step[:-1], step[1:]))[:, None]
     smooth = bend.T @ bend / KNOTS
+    found, left = _smoothest(hats, weight, logs, smooth)
     for _ in range(STEPS):
-        found, left = _smoothest(hats, weight, logs, smooth)
         off = (hats @ found).reshape(z.shape) - logs
         total = np.maximum(weight.sum(axis=1, keepdims=True), 1e-12)
         off -= (weight * off).sum(axis=1, keepdims=True) / total
         usual = max(float(np.median(np.abs(off[weight > 0]))), 0.5 / max(levels, 255))
         # what moved, or lies across an edge, is far off and does not count
         weight = weight / (1 + (off / (4 * usual)) ** 2)
+        found, left = _smoothest(hats, weight, logs, smooth)
     light = np.exp(np.maximum.accumulate(found - found[-1]))
     light[0] = 0.0  # black is no light
     return np.maximum.accumulate(light), left

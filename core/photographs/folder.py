@@ -45,6 +45,10 @@ _WORDS = {
     Kind.AMBIENT: ("ambient", "nolight"),
     Kind.EMPTY: ("empty", "background"),
 }
+# Text files with the lamps' directions, one of which is read.
+_LIGHTS = ("light_directions.txt", "lights.txt", "light_dirs.txt", "directions.txt", "light.txt")
+# Words of pictures that are what others have made of the photographs.
+_MADE = {"normal", "normals", "gt", "albedo", "depth", "preview", "thumbnail", "result"}
 _SECONDS = (
     re.compile(r"(?<![\d.])(\d+)[-_](\d+)s(?:ec)?(?![a-z0-9])", re.IGNORECASE),
     re.compile(r"(?<![\d.])(\d+(?:\.\d+)?)()s(?:ec)?(?![a-z0-9])", re.IGNORECASE),
@@ -149,7 +153,7 @@ def _other(folder: Path) -> tuple[Path, Description]:
         )
     if found := _one(folder, sorted(folder.glob("*.lp")) + sorted(folder.glob("*.LP"))):
         return found, _with_others(folder, _of_rows(found, _lp(found)), pictures)
-    for name in ("light_directions.txt", "lights.txt"):
+    for name in _LIGHTS:
         if (folder / name).is_file():
             return folder / name, _of_numbers(folder, folder / name, pictures)
     if found := _one(folder, sorted(folder.glob("*.csv"))):
@@ -280,27 +284,50 @@ def _of_numbers(folder: Path, path: Path, pictures: Sequence[str]) -> Descriptio
         count = int(lines.pop(0))
         if count != len(lines):
             raise PhotographsError(f"{path} says that it has {count} lamps, and has {len(lines)}")
-    rows = [_floats(re.split(r"[\s,;]+", line), path, line) for line in lines]
-    if len(rows) == 3 and len({len(row) for row in rows}) == 1 and len(rows[0]) > 3:
+    words = [re.split(r"[\s,;]+", line) for line in lines]
+    named = [row[0] for row in words if not _is_number(row[0])]
+    if named and len(named) < len(words):
+        raise PhotographsError(f"{path} has a name in some lines and in others none")
+    rows = [_floats(row[bool(named) :], path, line) for row, line in zip(words, lines, strict=True)]
+    names = named or _listed(folder, pictures)
+    if len(rows) == 3 and {len(row) for row in rows} == {len(names)} != {3}:
         rows = [list(column) for column in zip(*rows, strict=True)]  # x, y and z a line each
-    if any(len(row) != 3 for row in rows):
+    if any(len(row) not in (3, 4, 6) for row in rows):
         raise PhotographsError(f"{path} has a line that is not x, y and z")
-    names = [n for n in pictures if kind_by_name(n) is Kind.LIGHT]
-    if (folder / "filenames.txt").is_file():
-        names = _lines(folder / "filenames.txt")
     if len(names) != len(rows):
         raise PhotographsError(
             f"{path} has {len(rows)} lamps, and there are {len(names)} photographs: give each lamp "
             "its photograph (name a mask 'mask', and what no lamp lights 'dark' or 'ambient')"
         )
-    strengths = [(1.0, 1.0, 1.0)] * len(rows)
+    strengths = [_strength(row[3:]) for row in rows]
     if (there := folder / "light_intensities.txt").is_file():
         found = [_floats(re.split(r"[\s,;]+", line), there, line) for line in _lines(there)]
         if len(found) != len(rows) or any(len(row) not in (1, 3) for row in found):
             raise PhotographsError(f"{there} is not a strength, or three, for each lamp")
-        strengths = [(row[0], row[len(row) // 2], row[-1]) for row in found]
+        strengths = [_strength(row) for row in found]
     each = [(n, (r[0], r[1], r[2]), s) for n, r, s in zip(names, rows, strengths, strict=True)]
     return _with_others(folder, _of_rows(path, each), pictures)
+
+
+def _strength(row: Sequence[float]) -> Point:
+    """One strength of all channels, three, or none: then 1."""
+    return (row[0], row[len(row) // 2], row[-1]) if row else (1.0, 1.0, 1.0)
+
+
+def _listed(folder: Path, pictures: Sequence[str]) -> list[str]:
+    """The photographs in the order of a list of them, or else of their names."""
+    lists = [folder / "filenames.txt", *sorted(folder.glob("*.txt"))]
+    for path in (p for p in dict.fromkeys(lists) if p.is_file() and p.name not in _LIGHTS):
+        lines = [line for line in _lines(path) if not line.isdigit()]
+        names = [_plain(folder, line) for line in lines]
+        if names and set(names) <= set(pictures):
+            return [name for name in names if kind_by_name(name) is Kind.LIGHT]
+    lit = (name for name in pictures if kind_by_name(name) is Kind.LIGHT)
+    return [name for name in lit if not _MADE & _words(name)]
+
+
+def _words(name: str) -> set[str]:
+    return set(re.split(r"[^a-z]+", Path(name).stem.lower()))
 
 
 def kind_by_name(name: str) -> Kind:
@@ -315,7 +342,7 @@ def kind_by_name(name: str) -> Kind:
     Kind
         `light` where no word says otherwise.
     """
-    words = set(re.split(r"[^a-z]+", Path(name).stem.lower()))
+    words = _words(name)
     return next((kind for kind, some in _WORDS.items() if words & set(some)), Kind.LIGHT)
 
 

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import PhotographsError
+from . import agree
 from . import curve as curves
 from .curve import DARKEST, Curve
 from .description import LINEAR, SRGB, Description, Kind, Photograph
@@ -154,12 +155,30 @@ class Photographs:
             return Curve(None)
         several = [g for g in groups(lit).values() if len(_times(g)) > 1]
         if not several:
+            if found := self._agreeing(lit):
+                self.assumed = found
+                return Curve(None)
             self.assumed = (
                 f"the camera's curve is taken for that of {SRGB}, because no light was "
                 "photographed with two exposures"
             )
             return curves.srgb()
         return self._found(several)
+
+    def _agreeing(self, lit: Sequence[Photograph]) -> str:
+        """Why values are taken for light, in words; "" where sRGB's curve agrees as well."""
+        lamps = [lamp.place or lamp.direction for lamp in self.said.lamps]
+        first = [self.group(Kind.LIGHT, lamp=k)[:1] for k in range(len(lamps))]
+        several = len(lamps) < agree.FEWEST or len(lit) > len(lamps)
+        if several or None in lamps or () in first:
+            return ""
+        directions = np.array(lamps, np.float64)
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        strengths = np.array([lamp.strength for lamp in self.said.lamps])[:, None]
+        values = [self._sample(photo).reshape(-1, 3) for (photo,) in first]
+        step = max(1, len(values[0]) // PIXELS**2)
+        some = np.stack([v[::step] for v in values])
+        return agree.why_light(some, directions, strengths)
 
     def _found(self, several: list[tuple[Photograph, ...]]) -> Curve:
         """The curve that groups of exposures tell."""

@@ -17,7 +17,7 @@ from arto.core.fit.fit import fit
 from arto.core.light.environment import Environment, sample_directions
 from arto.core.light.environment import directions as directions_of
 from arto.core.light.light import PatchLight
-from arto.core.photographs import ball, curve, description_file, dome_set, folder, held_out, lamps
+from arto.core.photographs import ball, curve, dome_set, held_out, lamps
 from arto.core.photographs.description import Description, Kind, Lamp, Photograph
 from arto.core.photographs.opened import Photographs
 from arto.core.photographs.reader import InMemory, Picture
@@ -123,6 +123,21 @@ def test_a_curve_is_found_to_two_in_a_hundred(stops: int) -> None:
     seen = ~saturated & (true_light.min(axis=-1) > 0.05)
     assert seen.mean() > 0.5
     assert np.abs(off[seen] / np.median(off[seen]) - 1).mean() < 0.02
+
+
+@pytest.mark.parametrize("curved", [False, True])
+def test_values_that_are_light_are_told_from_values_for_a_display(curved: bool) -> None:
+    directions = around(12, 0.4)
+    said, pictures = dome(directions)
+    rng = np.random.default_rng(2)
+    for name, picture in list(pictures.items()):
+        light = np.clip(3.5 * picture.rows(0, HEIGHT), 0, 1)
+        shown = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+        values = (shown if curved else light) + rng.normal(0, 0.003, light.shape)
+        pictures[name] = InMemory(np.rint(np.clip(values, 0, 1) * 255) / 255)
+    there = opened(said, pictures)
+    assert (there.curve.table is None) != curved
+    assert ("taken for light" in there.assumed) != curved and there.assumed
 
 
 def test_what_is_saturated_in_every_exposure_is_a_mask() -> None:
@@ -316,55 +331,3 @@ def test_bad_photographs_are_a_sentence_each(tmp_path: Path) -> None:
     aside = replace(said, white=(70, 0, 20, 5))
     with pytest.raises(PhotographsError, match="not in the picture of 80 x 60"):
         written(opened(aside, pictures), tmp_path)
-
-
-def test_folders_of_other_programs_are_read(tmp_path: Path) -> None:
-    for name in ("img 1.jpg", "img 2.jpg", "img 10.jpg", "stone_mask.png", "dark.jpg"):
-        (tmp_path / name).write_bytes(b"")
-    (tmp_path / "dome.lp").write_text(
-        "3\r\nC:\\rti\\img 1.jpg 0 0 1\r\nimg 2.jpg 0.5 0.1 0.9\r\nimg 10.jpg -1e-1 0 1\r\n"
-    )
-    said = folder.read(tmp_path)
-    assert [p.file for p in said.of(Kind.LIGHT)] == ["img 1.jpg", "img 2.jpg", "img 10.jpg"]
-    assert said.lamps[2].direction == (-0.1, 0.0, 1.0)
-    assert [p.file for p in said.of(Kind.MASK)] == ["stone_mask.png"]
-    (tmp_path / "dome.lp").unlink()
-    (tmp_path / "light_directions.txt").write_text("0 0 1\n1 0 1\n0 1 1\n")
-    (tmp_path / "light_intensities.txt").write_text("1 1 1\n2 2 2\n1 .9 .8\n")
-    said = folder.read(tmp_path)
-    assert said.lamps[2] == Lamp((0.0, 1.0, 1.0), strength=(1.0, 0.9, 0.8))
-    assert said.photographs[2].file == "img 10.jpg"
-    (tmp_path / "light_directions.txt").unlink()
-    (tmp_path / "lights.csv").write_text(
-        "file;azimuth;elevation\nimg 1.jpg;0;0\nimg 2.jpg;90;0\nimg 10.jpg;0;90\n"
-    )
-    there = [lamp.direction for lamp in folder.read(tmp_path).lamps]
-    np.testing.assert_allclose(np.array(there), [[1, 0, 0], [0, 0, 1], [0, 1, 0]], atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("text", "error"),
-    [
-        ("2\na.jpg 0 0 1\nmissing.jpg 0 1 1\n", "names 'missing.jpg'"),
-        ("2\na.jpg 0 0 1\na.jpg 0 1 1\n", "'a.jpg' is there twice"),
-        ("2\na.jpg 0 0 1\nb.jpg 0 0 0\n", "'b.jpg' has length 0"),
-        ("3\na.jpg 0 0 1\nb.jpg 0 1 0\n", "says that it has 3 photographs, and has 2"),
-        ("2\na.jpg 0 0 1\nb.jpg 0 nan 0\n", "a word that is no number"),
-        ("a.jpg 0 0 1\n", "does not begin with the number"),
-    ],
-)
-def test_a_bad_lp_file_is_a_sentence(tmp_path: Path, text: str, error: str) -> None:
-    for name in ("a.jpg", "b.jpg"):
-        (tmp_path / name).write_bytes(b"")
-    (tmp_path / "dome.lp").write_text(text)
-    with pytest.raises(PhotographsError, match=error):
-        folder.read(tmp_path)
-
-
-def test_a_description_is_kept_as_a_file(tmp_path: Path) -> None:
-    said, _ = dome(around(3), white=(1, 2, 3, 4), ball=(1.0, 2.0, 3.0), curve="sRGB", view="down")
-    description_file.write(tmp_path, said)
-    assert description_file.read(tmp_path / "photographs.json") == said
-    with pytest.raises(PhotographsError, match=r"'photographs\[0\].file' cannot be '../out.jpg'"):
-        bad = replace(said, photographs=(Photograph("../out.jpg", Kind.LIGHT, lamp=0),))
-        description_file.from_json(bad.to_json(), tmp_path)
