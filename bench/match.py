@@ -15,6 +15,8 @@ from typing import Any
 
 import bpy
 import numpy as np
+from arto.arto_addon.match.match import can_render, steps
+from arto.arto_addon.work import run
 from arto.arto_addon.world.bake import bake
 from arto.core.files import whole
 from arto.core.light.environment import Environment
@@ -61,12 +63,10 @@ def matched(shot: Shot, target: NDArray, start: Environment) -> tuple[Matched, A
     begun = time.perf_counter()
     answers = Answers.of(Preview([shot.fields[ARTO]]))
     asked = Target(answers.columns(target), answers.sizes * answers.solid)
-    work = free_light(answers, start, asked, answers.layer("own"))
-    while True:
-        try:
-            next(work)
-        except StopIteration as e:
-            return e.value, answers, time.perf_counter() - begun
+    field, scene = shot.fields[ARTO], shot.scene()
+    work = free_light(answers, start, asked, answers.layer("own"), lamps=can_render(scene, field))
+    found = run(steps(work, scene, field, answers))
+    return found, answers, time.perf_counter() - begun
 
 
 def _true_plate(shot: Shot, world: World) -> NDArray[np.float32]:

@@ -5,6 +5,17 @@ from __future__ import annotations
 import bpy
 
 
+def set_on_world(world: bpy.types.World, scene: bpy.types.Scene, **values: object) -> None:
+    """Set properties of Cycles on a world.
+
+    At each such change Cycles asks the scene in front for its world, and fails where that scene has
+    none. So for the time of the change a scene that has one stands in front. scene: one that has.
+    """
+    with bpy.context.temp_override(scene=scene):
+        for name, value in values.items():
+            setattr(world.cycles, name, value)
+
+
 def to_front(scene: bpy.types.Scene) -> None:
     """Put a scene into the window of a Blender that nobody looks at.
 

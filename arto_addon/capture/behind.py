@@ -20,6 +20,7 @@ from mathutils import Vector
 from ...core.capture.names import BEHIND_LIGHT
 from ...core.errors import SceneError
 from ...core.hemicube import Hemicube
+from ..blender.front import set_on_world
 from ..blender.markers import camera_of
 from ..blender.nodes import Input, Nodes
 from ..blender.reached import reached
@@ -46,7 +47,7 @@ def see_behind(on: Stage) -> None:
         if prop.type == "BOOLEAN" and not prop.is_readonly:
             setattr(rays, prop.identifier, prop.identifier == "camera")
     # it lights nothing, and is no lamp among others
-    world.cycles.sampling_method = "NONE"
+    set_on_world(world, on.scene, sampling_method="NONE")
     layer.use_pass_environment = True
 
 

@@ -21,6 +21,7 @@ from ...core.files import replace_folder, whole
 from ...core.fit.fit import fit_into
 from ..blender import devices
 from ..blender.output import write_to
+from ..blender.saving import check_whole
 from ..capture import room
 from ..capture.around import Around, plan_of
 from ..capture.asked import Asked, asked
@@ -146,6 +147,7 @@ def _save_alone(scene: bpy.types.Scene, path: Path) -> None:
     scene.frame_start = scene.frame_end = scene.frame_current
     with whole(path) as partial:
         bpy.data.libraries.write(str(partial), {scene}, path_remap="RELATIVE", compress=True)
+        check_whole(partial)
 
 
 @contextmanager

@@ -20,6 +20,7 @@ from ...core import arrays, marked
 from ...core.errors import SceneError
 from ..blender import devices
 from ..blender.pictures import is_picture
+from ..blender.saving import check_whole
 from ..shot import home
 from .task import Painted, Task
 from .verbs import Verb
@@ -45,6 +46,7 @@ def take(folder: Path, verb: Verb, scene: bpy.types.Scene, view_layer: str) -> t
             compress=False,
             check_existing=False,
         )
+        check_whole(blend)
         painted = tuple(_painted(image, folder) for image in bpy.data.images if in_no_file(image))
         _link_caches(folder)
         ran = not bpy.app.autoexec_fail

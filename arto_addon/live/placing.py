@@ -16,6 +16,7 @@ from ...core.place.lobes import lobes_at
 from ...core.place.place import Placed, What, facing, grazing, normal_at, reflected, shading
 from ..blender.markers import camera_of
 from ..kit import kit as kits
+from ..kit.former import Former
 from ..relight.shown import Shown, newest
 from ..shot.shot import layer_of
 from ..world import dials, kept
@@ -147,6 +148,7 @@ class Gesture:
         if light and (self.before is None or self.before.light(light).lock):
             raise KitError(f"'{light}' is locked: unlock it in the list")
         self.placer = Placer(scene)
+        self._former = Former(world) if self.before is None else None
 
     def move(self, x: int, y: int) -> Light:
         """Put the light where it shines at a pixel. Raises FieldError, KitError."""
@@ -162,16 +164,18 @@ class Gesture:
         return change(self.scene, self.light, size=size, roll=roll, stops=stops)
 
     def back(self) -> None:
-        """Put the kit back as it was."""
+        """Put the kit, or the world that had none, back as it was."""
         world = check_world(self.scene, layer_of(self.scene))
         if self.before is not None:
             kits.write(world, self.before)
-        elif kits.has(world):  # the world as it was is the base now
-            kits.write(world, replace(kits.read(world), lights=()))
+        elif self._former is not None and kits.has(world):
+            self._former.put_back(world)
 
     def close(self) -> None:
-        """Let go of the field's files."""
+        """Let go of the field's files, and of the world as it was."""
         self.placer.close()
+        if self._former is not None:
+            self._former.let_go()
 
 
 def put_there(scene: bpy.types.Scene, name: str, placed: Placed) -> None:

@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 
 from ...core import exr
 from ...core.errors import TargetError
+from ...core.field.field import Field
 from ...core.match import ask, gains
 from ...core.match.answers import Answers
+from ...core.match.discs import Discs
 from ...core.match.match import Matched, free_light
 from ...core.match.target import Target
 from ...core.preview import Preview
@@ -31,6 +33,7 @@ from ..shot.shot import check_same_shot
 from ..work import Progress, Steps, Warned, Wrote
 from ..world import kept
 from ..world.check import check_world
+from ..world.disc_render import disc_light
 from .asked import asked, masks, named_in
 from .found import Found, match_file, write
 from .lights import BASE, WORLD, lights_of, own_parts
@@ -61,7 +64,7 @@ def match_target(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
         picture = picture * (1 - share) + now * share
         weights = np.maximum(weights, keep)
     target = Target(picture, weights * answers.solid * answers.sizes)
-    return (yield from _matched(scene, view_layer, answers, target, LOOK, wanted.words))
+    return (yield from _matched(shown, answers, target, LOOK, wanted.words))
 
 
 def even_out(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
@@ -84,7 +87,7 @@ def even_out(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
     )
     before = ask.unevenness(now, albedo, answers.columns(region) * counts)
     words = f"the light on the region varied by {before:.0%}"
-    return (yield from _matched(scene, view_layer, answers, target, EVEN, words, asked_scale=False))
+    return (yield from _matched(shown, answers, target, EVEN, words, asked_scale=False))
 
 
 def _shown(scene: bpy.types.Scene, layer: str) -> Shown:
@@ -109,8 +112,7 @@ def _now(scene: bpy.types.Scene, layer: str, answers: Answers) -> Steps[NDArray[
 
 
 def _matched(
-    scene: bpy.types.Scene,
-    layer: str,
+    shown: Shown,
     answers: Answers,
     target: Target,
     name: str,
@@ -118,6 +120,7 @@ def _matched(
     asked_scale: bool = True,
 ) -> Steps[Path]:
     """Find the light of a target and write it -> the path of what was found."""
+    scene, layer, field = shown.scene, shown.layer, shown.takes[-1].field
     settings = scene.arto
     world = check_world(scene, layer)
     look = looks.free_name(scene, name)
@@ -133,9 +136,10 @@ def _matched(
         check_beside(scene, lit, relit_file(scene, look), named_in(scene))
         present = kept.environment(scene, settings.environment_width, layer, world)
         own = sum(own_parts(scene, answers).values(), np.zeros_like(target.picture))
-        done = yield from _steps(
-            free_light(answers, present, target, own, settings.match_near, exposure, balance)
-        )
+        lamps = can_render(scene, field)
+        wish = settings.match_near, exposure, balance
+        work = free_light(answers, present, target, own, *wish, lamps=lamps)
+        done = yield from steps(work, scene, field, answers)
         assert done.environment is not None
         about = {PLATE: relit_file(scene, look).name}
         exr.write(lit, {"": done.environment.image}, about, working_space())
@@ -157,9 +161,8 @@ def _matched(
             lamps = {n: p for n, p in parts.items() if n in lights.grey and n != base}
             others = [p for n, p in parts.items() if n != base and n not in lamps]
             fixed = sum(others, lights.fixed)
-            done = yield from _steps(
-                gains.turned(answers, lights.base, lamps, fixed, target, wish, base)
-            )
+            work = gains.turned(answers, lights.base, lamps, fixed, target, wish, base)
+            done = yield from steps(work, scene, field, answers)
         elif not parts:
             raise TargetError("no light can change: every light of the kit is locked or a flag")
         else:
@@ -182,14 +185,33 @@ def _matched(
     return path
 
 
-def _steps(work: Generator[float, None, Matched]) -> Steps[Matched]:
-    """Do the work of the core, and tell how far it is."""
+def steps(
+    work: Generator[float | Discs, NDArray | None, Matched],
+    scene: bpy.types.Scene,
+    field: Field,
+    answers: Answers,
+) -> Steps[Matched]:
+    """Do the work of the core, tell how far it is, and render the discs that it asks for."""
+    share, pictures = 0.0, None
     while True:
         try:
-            share = next(work)
+            asked = work.send(pictures)
         except StopIteration as e:
             return e.value
-        yield Progress(0.25 + 0.7 * share, "looking for the light")
+        pictures = None
+        if isinstance(asked, Discs):
+            factor = answers.factors[1]
+            light = yield from disc_light(scene, field, asked, factor, 0.25 + 0.7 * share)
+            pictures = np.array([[answers.columns(one) for one in half] for half in light])
+        else:
+            share = asked
+            yield Progress(0.25 + 0.7 * share, "looking for the light")
+
+
+def can_render(scene: bpy.types.Scene, field: Field) -> bool:
+    """Whether lamps can be rendered by themselves, as the plate of a match has them."""
+    about = field.about
+    return scene.arto.lamps and about.far is not False and about.view_layer is not None
 
 
 def said(done: Matched, words: str = "") -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -67,6 +68,8 @@ def _check(scene: bpy.types.Scene, path: Path, overwrite: bool) -> None:
         raise SceneError(f"the name {str(path)!a} is not written in UTF-8: choose another")
     if found := inputs(scene).over(path):
         raise SceneError(f"{path} is {found.what}, and is not written over: choose another file")
+    if os.path.lexists(path) and not path.is_file():
+        raise SceneError(f"{path} is no file that could be written over: choose another name")
     if overwrite or not path.exists():
         return
     try:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ...core import marked
 from ...core.errors import SceneError
 from ..blender.nodes import shader_tree, trees
+from ..blender.saving import check_whole
 from ..job.snapshot import in_no_file, pixels_of
 from ..shot import pixels
 from ..world.still import is_restless, still
@@ -102,6 +103,7 @@ def _write(blend: Path, block: bpy.types.ID) -> None:
     try:
         # absolute paths: the small file lies in another folder than the artist's
         bpy.data.libraries.write(str(blend), {block}, path_remap="ABSOLUTE", fake_user=True)
+        check_whole(blend)
     except (OSError, RuntimeError) as e:
         raise SceneError(f"the world cannot be written to {blend} ({e})") from e
 

@@ -20,6 +20,7 @@ import bpy
 from ...core.errors import ArtoError, SceneError
 from ...core.files import write_text
 from ..blender.front import to_front
+from ..blender.saving import save
 from ..capture.capture import capture, estimate
 from ..capture.more import more_of_frames, more_samples
 from ..capture.sequence import capture_frames
@@ -186,7 +187,7 @@ def _match(
     work: Steps[object] = match_and_apply(scene, layer)
     run(_as_asked(work, batch, False), report)
     if saves:
-        _save_blend()
+        save()
 
 
 def _say_unsaved(verb: str, folder: Path) -> None:
@@ -267,14 +268,7 @@ def _save(scene: bpy.types.Scene, layer: str, folder: str | None) -> None:
         paths.claim(scene, layer)
     finally:
         scene.arto.folder = before
-    try:
-        _save_blend()
-    except RuntimeError as e:
-        raise SceneError(f"{home.file()} cannot be saved ({e}): see who may write there") from e
-
-
-def _save_blend() -> None:
-    bpy.ops.wm.save_mainfile()
+    save()
 
 
 def _adopt(scene: bpy.types.Scene, layer: str, source: Path | None) -> None:

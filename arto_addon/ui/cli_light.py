@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import bpy
 from ...core.errors import KitError, SceneError
 from ...core.kit import kit_file
 from ..blender.nodes import new_world
+from ..blender.saving import save
 from ..kit import kit as kits
 from ..relight import kit_out
 from ..shot import home
@@ -27,6 +29,8 @@ def light(scene: bpy.types.Scene, layer: str, options: dict[str, Any]) -> None:
     if file is None and options["hdri"] is None:
         raise OptionError("light: name a kit's file by --json, or an HDRI to write by --hdri")
     said = str(file) == "-"
+    if file is not None and not said and os.path.lexists(file) and not file.is_file():
+        raise OptionError(f"--json {file} is a folder, or no file that could be read: name another")
     if file is not None and not said and file.is_file() and not options["write"]:
         give(scene, layer, file.resolve())
         if options["save"]:
@@ -65,7 +69,4 @@ def give(scene: bpy.types.Scene, layer: str, file: Path) -> None:
 def _save() -> None:
     if not home.file():
         raise SceneError("this .blend was never saved, so --save has no place for it: save it")
-    try:
-        bpy.ops.wm.save_mainfile()
-    except RuntimeError as e:
-        raise SceneError(f"{home.file()} cannot be saved ({e}): see who may write there") from e
+    save()

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ...core import exr
 from ...core.capture.names import combined
 from ...core.region import Region
+from ..blender.front import set_on_world
 from ..blender.output import float_exr, write_to
 from ..blender.reached import reached
 from ..blender.scratch import temporary
@@ -40,7 +41,7 @@ def _set(on: Stage, world: bpy.types.World, region: Region, even: bool) -> None:
     layer.use_pass_z = layer.cycles.denoising_store_passes = False
     on.scene.world = world
     # Nothing is lit here, so Cycles needs no map for importance sampling.
-    on.scene.world.cycles.sampling_method = "NONE"
+    set_on_world(on.scene.world, on.scene, sampling_method="NONE")
     cycles.samples = BACKGROUND_SAMPLES
     cycles.use_adaptive_sampling = not even
     cycles.adaptive_threshold = BACKGROUND_NOISE

@@ -21,6 +21,7 @@ from ...core.errors import FieldError, SceneError
 from ...core.field.field import Field
 from ...core.light.environment import Environment
 from ..blender.colour import working_space
+from ..blender.front import set_on_world
 from ..blender.nodes import dark_world
 from ..stage.bounds import rendered
 from ..stage.settings import prepare
@@ -70,9 +71,8 @@ class Sky:
         world.lightgroup = group
         # Cycles' automatic choice takes a second for a map of 4096. A sampling map twice as fine as
         # the light also finds the blended rims of the light's texels.
-        world.cycles.max_bounces = 1024
-        world.cycles.sampling_method = "MANUAL"
-        world.cycles.sample_map_resolution = 2 * width
+        sampled = {"sampling_method": "MANUAL", "sample_map_resolution": 2 * width}
+        set_on_world(world, on.scene, max_bounces=1024, **sampled)
 
     def turn(self, angle: float) -> None:
         """Turn the world, which must be one that turns, to an angle in radians."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core import exr
+from ..blender.front import set_on_world
 from ..blender.output import float_exr, write_to
 from ..blender.scratch import temporary
 from ..work import Render, blocking_render
@@ -47,7 +48,7 @@ def studio_scene(
         studio.world = world.copy()
         made.append(studio.world)
         # Nothing is lit here, so Cycles needs no map for importance sampling.
-        studio.world.cycles.sampling_method = "NONE"
+        set_on_world(studio.world, studio, sampling_method="NONE")
         studio.frame_set(scene.frame_current, subframe=scene.frame_subframe)
         studio.cycles.device = scene.cycles.device
         like_textures(studio, of_textures(scene))

@@ -106,6 +106,21 @@ class MergedModel:
         assert found is not None
         return found
 
+    def shares(self, at: slice) -> NDArray[np.float32]:
+        """As `Model.shares`.
+
+        Parameters
+        ----------
+        at : slice
+
+        Returns
+        -------
+        (3, n) float32
+        """
+        out = self.codes[:, at].astype(np.float32)
+        out *= out
+        return out
+
     def parameters_of(self, at: slice) -> NDArray[np.float32]:
         """As `Model.parameters_of`.
 

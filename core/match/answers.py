@@ -36,6 +36,8 @@ from .target import smaller
 PIXELS, FINE_PIXELS = 8_500, 5_000
 # A pixel is shiny from this share of its answers on that narrow supports have.
 SHINY = 0.25
+# A pixel is a mirror from this share on.
+MIRROR = 0.5
 # From this alpha on a pixel shows nothing of the world behind.
 SOLID = 0.995
 
@@ -57,6 +59,9 @@ class Answers:
     shiny : (m,) int
         The pixels of the finer proxy, which are the last m of n.
     alpha : (n,) float64
+    mirrors : (h, w) bool, optional
+        The pixels of the small proxy that nearly nothing but narrow supports light: they show what
+        light there is, whatever it is.
     """
 
     cells: Cells
@@ -66,6 +71,7 @@ class Answers:
     factors: tuple[int, int]
     shiny: NDArray[np.intp]
     alpha: NDArray[np.float64]
+    mirrors: NDArray[np.bool_] | None = None
 
     @staticmethod
     def of(preview: Preview, most: int = MOST) -> Answers:
@@ -103,7 +109,9 @@ class Answers:
         if len(shiny):
             values = np.concatenate([values, answers(fine, cells, shiny)], axis=-1)
             alpha = np.concatenate([alpha, fine.layer("alpha").ravel()[shiny]])
-        return Answers(cells, values, small, fine, (factor, finer), shiny, alpha.astype(np.float64))
+        mirrors = (_shares_of_narrow(small) > MIRROR).reshape(small.shape)
+        factors, alpha = (factor, finer), alpha.astype(np.float64)
+        return Answers(cells, values, small, fine, factors, shiny, alpha, mirrors)
 
     def refined(self, sides: NDArray[np.intp]) -> Answers:
         """Cut patches into more cells.

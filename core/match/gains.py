@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 
 from ..light.environment import Environment
 from .answers import Answers
-from .match import ODD, ROUNDS, Matched, brought, concluded, pull_of
+from .fit import ODD, ROUNDS, pull_of
+from .match import Matched, brought, concluded
 from .solve import nonnegative
 from .target import Target, between
 
@@ -171,7 +172,7 @@ def turned(
     target: Target,
     wish: Wish = Wish(),
     name: str = "base",
-) -> Generator[float, None, Matched]:
+) -> Generator[float, object, Matched]:
     """Find the turn of a base, its gain, and the gains of other lights.
 
     Parameters

@@ -1,14 +1,13 @@
-"""Matching: the light under which a shot looks like a target, by least squares.
+"""Matching: the light under which a shot looks like a target.
 
-What is minimised is the error of each pixel relative to its light, without the weight of those few
-that no light can match, plus two pulls. One holds each cell to the present light; the other holds
-neighbouring cells together where the picture says nothing, and lets go at the rims of windows and
-suns.
+Cells take most of the light. Lamps are smaller than a cell. Who can render them is asked for
+pictures of discs where the light is brightest; who cannot gets finer cells there.
 
 Examples
 --------
->>> [float(f"{pull_of(near):.1e}") for near in (0.0, 0.5, 1.0)]
-[1e-05, 0.01, 10.0]
+>>> target = Target(np.full((2, 3), 4.0), np.ones(2))
+>>> brought(target, np.ones((2, 3)), exposure=True, balance=False).tolist()
+[0.25, 0.25, 0.25]
 """
 
 from __future__ import annotations
@@ -23,21 +22,16 @@ from ..light.environment import Environment
 from ..metrics import mean_relative_error
 from .answers import Answers
 from .cells import Cells
+from .discs import SIZES, Discs, finer, sought
+from .fit import Columns, fitted
 from .missing import Missing, missing
-from .solve import nonnegative
-from .target import Target, between
+from .target import Target
 
-# Rounds in which what does not fit loses weight, and by which relative error a pixel has lost half.
-ROUNDS, ODD = 3, 0.05
-# The pull between neighbours, and the step between them, in mean lights, that it lets go.
-SMOOTH, STEP = 1e-5, 0.3
-# The pull to the present light, from `faithful` to `near`.
-FAITHFUL, NEAR = 1e-5, 1e1
 # A lamp has at least this share of all light, and is so many times brighter than the mean. Its
 # patch is cut into 4 times as many cells a side, up to a number; and the most cells in all.
 LAMP, CONTRAST, FINEST, MOST_FINE = 0.01, 4.0, 16, 1300
-# Rows of the map that is made.
-HEIGHT = 256
+# Rows of the map that is made, and how many times more where it has discs.
+HEIGHT, SHARPER = 256, 2
 
 
 @dataclass(frozen=True)
@@ -72,22 +66,6 @@ class Matched:
     picture: NDArray[np.float64]
     target: NDArray[np.float64]
     missing: Missing
-
-
-def pull_of(near: float) -> float:
-    """Say how strongly a slider holds to the present light.
-
-    Parameters
-    ----------
-    near : float
-        From 0, faithful to the target, to 1, near to the present light.
-
-    Returns
-    -------
-    float
-        The weight of the pull.
-    """
-    return FAITHFUL * (NEAR / FAITHFUL) ** float(np.clip(near, 0, 1))
 
 
 def brought(
@@ -127,7 +105,8 @@ def free_light(
     exposure: bool = False,
     balance: bool = False,
     height: int = HEIGHT,
-) -> Generator[float, None, Matched]:
+    lamps: bool = False,
+) -> Generator[float | Discs, NDArray | None, Matched]:
     """Find light in all directions that makes a shot look like a target.
 
     Parameters
@@ -145,36 +124,101 @@ def free_light(
         See `brought`.
     height : int
         Rows of the map.
+    lamps : bool
+        Whether pictures of discs can be had.
 
     Yields
     ------
-    float
-        How much is done, 0 to 1.
+    float or Discs
+        How much is done, 0 to 1. With `lamps` also discs whose pictures are to be sent, each
+        with radiance 1: (2, L, n, 3) float at the pixels of `answers`, from two renders whose noise
+        differs.
 
     Returns
     -------
     Matched
     """
-    cells = answers.cells
-    have = cells.radiance(present)
-    shown = answers.picture(have) + own
+    have = answers.cells.radiance(present)
+    columns = Columns.of(answers, have)
+    shown = columns.picture(have) + own
     scale = brought(target, shown, exposure, balance)
     target = target.scaled(scale)
-    yield 0.1
-    found = yield from _solved(answers, have, target, own, near, 0.1, 0.5)
-    finer = _finer(answers.cells, found)
-    if finer is not None:
-        answers = answers.refined(finer)
+    yield 0.05
+    found = yield from _between(fitted(columns, target, own, near), 0.05, 0.35)
+    discs = sought(answers.cells, found) if lamps else None
+    if discs:
         cells = answers.cells
-        have = cells.radiance(present)
-        found = yield from _solved(answers, have, target, own, near, 0.5, 0.9)
-    environment = cells.environment(found, height, present)
+        columns, discs, found = yield from _with_discs(columns, discs, target, own, near, found)
+        light, lit = found[: cells.count], found[cells.count :]
+        image = cells.environment(light, height, present).image
+        sharper = Environment(image.repeat(SHARPER, axis=0).repeat(SHARPER, axis=1))
+        picture = columns.picture(found) + own
+        environment = discs.drawn_on(sharper, lit)
+        return concluded(answers, target, picture, shown, scale, environment)
+    sides = _sides(answers.cells, found)
+    if sides is not None:
+        answers = answers.refined(sides)
+        columns = Columns.of(answers, answers.cells.radiance(present))
+        found = yield from _between(fitted(columns, target, own, near), 0.35, 0.9)
+    environment = answers.cells.environment(found, height, present)
     return concluded(
         answers, target, answers.under(environment) + own, shown, scale, environment=environment
     )
 
 
-def _finer(cells: Cells, radiance: NDArray[np.float64]) -> NDArray[np.intp] | None:
+def _between(
+    work: Generator[float, object, NDArray[np.float64]], first: float, last: float
+) -> Generator[float, object, NDArray[np.float64]]:
+    """Do a piece of the work. first, last: how much is done before and after."""
+    while True:
+        try:
+            share = next(work)
+        except StopIteration as e:
+            return e.value
+        yield first + (last - first) * share
+
+
+def _with_discs(
+    cells: Columns,
+    asked: Discs,
+    target: Target,
+    own: NDArray[np.float64],
+    near: float,
+    found: NDArray[np.float64],
+) -> Generator[float | Discs, NDArray | None, tuple[Columns, Discs, NDArray[np.float64]]]:
+    """Find the light of cells and of discs, smaller and smaller ones -> (columns, discs, light).
+
+    asked: the first discs; found: the light of the cells without discs.
+    """
+    count = len(cells.solid_angles)
+    discs = asked.only(np.zeros(len(asked), bool))
+    shown = np.empty((3, 2, 0, cells.values.shape[-1]), np.float32)
+    columns = cells
+    step = 0.55 / len(SIZES)
+    for i, _ in enumerate(SIZES):
+        done = 0.35 + i * step
+        pictures = yield asked
+        assert pictures is not None
+        more = np.moveaxis(pictures, -1, 0).astype(np.float32)
+        discs, shown = discs.and_(asked), np.concatenate([shown, more], axis=2)
+        columns = cells.and_discs(discs, shown)
+        start = np.concatenate([found, np.zeros((len(discs) - len(found) + count, 3))])
+        last = i + 1 == len(SIZES)
+        rounds = 2 if last else 1
+        found = yield from _between(
+            fitted(columns, target, own, near, start, rounds), done + 0.5 * step, done + step
+        )
+        if last:
+            break
+        kept, asked = finer(discs, found[count:], SIZES[i + 1])
+        if not len(asked):
+            break
+        found = np.concatenate([found[:count], found[count:][kept]])
+        discs, shown = discs.only(kept), shown[:, :, kept]
+    return columns, discs, found
+
+
+def _sides(cells: Cells, radiance: NDArray[np.float64]) -> NDArray[np.intp] | None:
     """Cut the patches of bright lights more finely -> (K,) cells a side; None where none is one.
 
     A lamp is smaller than a cell, and its place decides where its shadows and its images are.
@@ -192,72 +236,6 @@ def _finer(cells: Cells, radiance: NDArray[np.float64]) -> NDArray[np.intp] | No
         if finer > sides[k] and (sides**2).sum() + finer**2 - sides[k] ** 2 <= MOST_FINE:
             sides[k] = finer
     return sides if (sides > cells.sides).any() else None
-
-
-def _solved(
-    answers: Answers,
-    have: NDArray[np.float64],
-    target: Target,
-    own: NDArray[np.float64],
-    near: float,
-    first: float,
-    last: float,
-) -> Generator[float, None, NDArray[np.float64]]:
-    """Find the radiance of the cells, (M, 3). first, last: how much is done before and after."""
-    cells = answers.cells
-    used = np.flatnonzero(target.weights > 0)
-    asked, lamps, dark = target.picture[used], own[used], target.dark
-    lit = answers.picture(have)[used]
-    wanted = asked - lamps
-    weights = target.weights[used]
-    weights = weights / weights.sum()
-    omega = cells.solid_angles / (4 * np.pi)
-    # the present light, as bright as the target, is what is held to
-    levels = _levels(weights @ lit, weights @ wanted)
-    level = float(levels.mean())
-    mean = np.maximum(omega @ have, 1e-3 * float((omega @ have).max())) * levels
-    mean = np.maximum(mean, 1e-12)
-    pairs, border = cells.borders
-    one, two = pairs.T
-    found = np.empty_like(have)
-    for c in range(3):
-        matrix = answers.values[c][:, used]
-        pull = pull_of(near) * omega / mean[c] ** 2
-        hold = level ** (1 - near) * have[:, c]
-        made = lamps[:, c] + levels[c] * lit[:, c]
-        some, link = np.ones(len(used)), np.ones(len(pairs))
-        x: NDArray[np.float64] | None = None
-        for i in range(ROUNDS):
-            # the brighter of both at first, so that a place that cannot be as dark as it should be
-            # does not rule where the search begins
-            ruled = between if i else np.maximum
-            relative = np.maximum(ruled(asked[:, c], made), 0) + dark
-            root = (np.sqrt(some * weights) / relative).astype(np.float32)
-            weighted = matrix * root
-            gram = (weighted @ weighted.T).astype(np.float64)
-            right = (weighted @ (root * wanted[:, c].astype(np.float32))).astype(np.float64)
-            gram[np.diag_indices(cells.count)] += pull
-            e = SMOOTH * border * link / (4 * np.pi * mean[c] ** 2)
-            np.add.at(gram, (one, one), e)
-            np.add.at(gram, (two, two), e)
-            np.add.at(gram, (one, two), -e)
-            np.add.at(gram, (two, one), -e)
-            x = nonnegative(gram, right + pull * hold, x)
-            made = x.astype(np.float32) @ matrix + lamps[:, c]
-            off = (made - asked[:, c]) / (between(asked[:, c], made) + dark)
-            some = 1 / np.sqrt(off**2 + ODD**2)
-            some /= weights @ some
-            link = 1 / np.sqrt(((x[one] - x[two]) / mean[c]) ** 2 + STEP**2)
-            yield first + (last - first) * (c * ROUNDS + i + 1) / (3 * ROUNDS)
-        found[:, c] = x
-    return found
-
-
-def _levels(shown: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How many times brighter the target is than the present picture, (3,), from their means."""
-    least = 1e-3 * max(float(np.abs(wanted).max()), 1e-12)
-    wanted = np.maximum(wanted, least)
-    return np.divide(wanted, shown, out=np.ones(3), where=shown > least)
 
 
 def concluded(
@@ -308,5 +286,5 @@ def concluded(
         error(np.maximum(before, 0)),
         made,
         as_asked,
-        missing(made, as_asked, counts),
+        missing(made, as_asked, counts, answers.mirrors),
     )

@@ -54,7 +54,10 @@ class Missing:
 
 
 def missing(
-    picture: NDArray[np.float64], target: NDArray[np.float64], counts: NDArray[np.bool_]
+    picture: NDArray[np.float64],
+    target: NDArray[np.float64],
+    counts: NDArray[np.bool_],
+    mirrors: NDArray[np.bool_] | None = None,
 ) -> Missing:
     """Find places of a target that a picture does not come near.
 
@@ -64,6 +67,9 @@ def missing(
         Scene-linear radiance.
     counts : (h, w) bool
         The pixels that were matched.
+    mirrors : (h, w) bool, optional
+        The pixels that show what light there is: some light makes them as they are in the target,
+        so they are not told.
 
     Returns
     -------
@@ -73,7 +79,7 @@ def missing(
     if not counts.any():
         return Missing(difference, 0.0, "")
     made, asked = (np.where(counts, np.maximum(p, 0).sum(axis=-1), 0) for p in (picture, target))
-    reach = max(1, round(counts.shape[1] * ACROSS / 2))
+    reach = max(2, round(counts.shape[1] * ACROSS / 2))
     around = _mean(counts.astype(np.float64), reach)
     made, asked = (_mean(p, reach) for p in (made, asked))
     both = np.maximum(made, asked)
@@ -81,6 +87,8 @@ def missing(
     floor = 0.1 * float(both[counts].mean())
     off = np.divide(asked - made, both + floor, out=np.zeros_like(both), where=both > 0)
     off[~counts | (around < 0.5)] = 0
+    if mirrors is not None:
+        off[_mean((mirrors & counts).astype(np.float64), reach) > 0.5 * around] = 0
     dark, bright = (off < -OFF), (off > OFF)
     share = float((dark | bright).sum()) / float(counts.sum())
     if share < LEAST:

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 # Rounds in which unknowns are set free or held at 0 all at once, and the steps after them.
 PIVOTS, STEPS = 6, 100
+# Such rounds where the search begins with a guess.
+FEWER = 3
 # The change of the unknowns, relative to the largest, at which the steps end.
 CLOSE = 1e-5
 
@@ -49,7 +51,7 @@ def nonnegative(
     gram, right = gram * scale * scale[:, None], right * scale
     free = np.ones(len(right), bool) if start is None else np.asarray(start) > 0
     best, least = np.zeros(len(right)), 0.0
-    for _ in range(PIVOTS):
+    for _ in range(PIVOTS if start is None else FEWER):
         x = np.zeros(len(right))
         if free.any():
             x[free] = np.linalg.solve(gram[np.ix_(free, free)], right[free])

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 from arto.arto_addon import work
+from arto.arto_addon.blender.nodes import new_world
 from arto.arto_addon.blender.output import float_exr
 from arto.arto_addon.capture import capture
 from arto.arto_addon.fit import fit
@@ -217,6 +218,38 @@ def test_an_appended_kit_is_the_kit_and_a_linked_one_is_left_alone(scene, tmp_pa
             assert kits.read(scene.world) == kit
 
 
+def _said(world) -> list:
+    """All that the nodes of a world say."""
+    tree = world.node_tree
+    values = [
+        [str(getattr(s, "default_value", "")) for s in (*n.inputs, *n.outputs)] for n in tree.nodes
+    ]
+    nodes = [(n.name, n.bl_idname, n.label, n.mute, tuple(n.location)) for n in tree.nodes]
+    links = [(k.from_node.name, k.from_socket.name, k.to_node.name) for k in tree.links]
+    return [world.name, world.use_fake_user, nodes, values, sorted(links)]
+
+
+def _given_up_without_a_kit(scene, x: int, y: int) -> None:
+    """The nodes that a kit took for its base are as they were, and nothing is left of the kit."""
+    kit_world = scene.world
+    scene.world = plain = new_world("Plain")
+    plain.use_fake_user = True
+    nodes = plain.node_tree.nodes
+    nodes["Background"].inputs["Strength"].default_value = 0.3
+    sky = nodes.new("ShaderNodeTexSky")
+    plain.node_tree.links.new(sky.outputs[0], nodes["Background"].inputs["Color"])
+    said, blocks = _said(plain), {*bpy.data.node_groups, *bpy.data.worlds}
+    gesture = placing.Gesture(scene, What.REFLECT)
+    gesture.move(x, y)
+    assert kits.has(scene.world)
+    gesture.back()
+    gesture.close()
+    assert _said(scene.world) == said
+    assert len({*bpy.data.node_groups, *bpy.data.worlds}) == len(blocks)
+    bpy.data.worlds.remove(scene.world)
+    scene.world = kit_world
+
+
 def test_a_light_is_put_moved_and_put_back(scene) -> None:
     """The tool without its mouse, on the front of the glossy box."""
     settings = scene.arto
@@ -241,6 +274,7 @@ def test_a_light_is_put_moved_and_put_back(scene) -> None:
     gesture.back()
     gesture.close()
     assert kits.read(scene.world) == before
+    _given_up_without_a_kit(scene, x, y)
     # a locked light is moved by no tool, and a place without things says so
     kits.write(scene.world, Kit((replace(KEY, lock=True),)))
     with pytest.raises(KitError, match="locked"):
