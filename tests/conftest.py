@@ -18,7 +18,7 @@ from tools import package
 def own_modules() -> Path:
     """The folder of what the module bpy brings for Python, found without loading bpy."""
     (bpy,) = importlib.util.find_spec("bpy").submodule_search_locations
-    return next(Path(bpy).glob("*/python/lib/python*/site-packages"))
+    return next(Path(bpy).glob("*/python/lib/**/OpenImageIO")).parent
 
 
 # Every test that imports OpenImageIO has Blender's own.

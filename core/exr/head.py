@@ -86,6 +86,12 @@ class PartLayout:
     attributes: Attributes
 
     @property
+    def packing(self) -> str:
+        """The name of the compression; empty for a newer one."""
+        known = self.compression < len(COMPRESSIONS)
+        return COMPRESSIONS[self.compression] if known else ""
+
+    @property
     def lines(self) -> int:
         """Lines of pixels in a chunk, or in a row of tiles."""
         if self.tiles:

@@ -30,7 +30,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .head import (
-    COMPRESSIONS,
     MULTIPART,
     Attributes,
     LayoutError,
@@ -131,7 +130,7 @@ def plain(data: mmap.mmap | bytes) -> list[PlainPart] | None:
     return found
 
 
-def put_heads(path: Path, heads: Sequence[Attributes], compression: str) -> None:
+def put_heads(path: Path, heads: Sequence[Attributes]) -> None:
     """Put other headers into a whole file; the tables of chunks and the chunks move with them.
 
     What tells how the pixels are stored stays as it is.
@@ -142,13 +141,11 @@ def put_heads(path: Path, heads: Sequence[Attributes], compression: str) -> None
         A file that nobody reads yet: it is changed in place.
     heads : sequence of Attributes
         The attributes of each part.
-    compression : str
-        How the pixels should be stored: one of `COMPRESSIONS`.
 
     Raises
     ------
     LayoutError
-        The file is not whole, or its pixels are stored in another way.
+        The file is not whole.
     OSError
         It cannot be written.
     """
@@ -159,8 +156,6 @@ def put_heads(path: Path, heads: Sequence[Attributes], compression: str) -> None
         with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
             parts, tables, _ = _checked(data)
             end = parsed(data)[1]
-        if any(COMPRESSIONS[part.compression] != compression for part in parts):
-            raise LayoutError(f"its pixels are not stored as {compression}")
         headers = packed(
             [
                 head | {n: value for n, value in part.attributes.items() if n in _STORED}

@@ -78,12 +78,14 @@ class OpenExr:
         OSError, RuntimeError
             The file cannot be written.
         ExrError
-            The package is missing.
+            The package is missing, or does not know the compression.
         """
         package = _package()
         packing = getattr(package, f"{compression}_COMPRESSION", None)
         if packing is None:
-            raise OSError(f"this OpenEXR stores no pixels as {compression}")
+            raise ExrError(
+                f"{path} cannot be written: {self.name} packs no pixels as {compression} here"
+            )
         corners = np.array(box[:2], np.int32), np.array(box[2:], np.int32)
         head = {
             "compression": packing,

@@ -253,4 +253,7 @@ def _unread(path: Path, said: Callable[[], str]) -> ExrError:
         words = said().strip()
     except UnicodeDecodeError as e:  # they quote the file, whatever is in it
         words = e.object.decode("utf-8", "replace").strip()
-    return ExrError(f"{path} cannot be read ({words}): it is damaged; make it again")
+    return ExrError(
+        f"{path} cannot be read ({words}): it is damaged, or packed in a way that this OpenImageIO "
+        "does not know; make it again, packed as ZIP"
+    )

@@ -2,7 +2,7 @@
 
 Examples
 --------
->>> check_complete(Path("none.exr"))
+>>> headers(Path("none.exr"))
 Traceback (most recent call last):
 ...
 arto.core.errors.ExrError: there is no file none.exr: it was moved or deleted; make it again
@@ -112,22 +112,6 @@ def check_name(path: Path) -> None:
             f"the name of {str(path)!a} is no UTF-8, so no library of EXR files can be given it: "
             "rename the file or its folder"
         ) from None
-
-
-def check_complete(path: Path) -> None:
-    """Check that all of a file is there.
-
-    Parameters
-    ----------
-    path : Path
-
-    Raises
-    ------
-    ExrError
-        The file is missing, truncated or damaged.
-    """
-    with _opened(path) as data, _telling(path):
-        check_layout(data)
 
 
 def mapped(path: Path) -> tuple[mmap.mmap, list[PlainPart] | None]:

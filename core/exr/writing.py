@@ -31,7 +31,7 @@ from .attributes import encoded_head
 from .head import LayoutError
 from .layout import put_heads
 from .library import chosen
-from .opening import check_complete, check_name
+from .opening import check_name, headers
 from .window import FULL, Window
 
 # Gives a path to write to, and puts the file in its place when it is complete.
@@ -254,10 +254,16 @@ def _write(
             )
             # a library says nothing when the last bytes find no room
             try:
-                put_heads(partial, heads, compression)
-                check_complete(partial)
-            except (ExrError, LayoutError) as e:
-                raise OSError(f"it came out incomplete, {e}") from None
+                put_heads(partial, heads)
+                stored, _ = headers(partial)
+            except (ExrError, LayoutError):
+                raise OSError("it came out incomplete") from None
+            # and may take another compression for one that it does not know
+            if any(part.packing != compression for part in stored):
+                raise ExrError(
+                    f"{path} cannot be written: {chosen().name} packs no pixels as {compression} "
+                    f"here; choose one of {', '.join(COMPRESSIONS)}"
+                )
     except (OSError, RuntimeError) as e:
         raise ExrError(
             f"{path} cannot be written ({e}): make room on the disk, or choose a folder that "
