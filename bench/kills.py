@@ -8,6 +8,7 @@ down in the capture's description.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import random
 import signal
 import subprocess
@@ -53,8 +54,9 @@ try:
 except work.CancelledError:
     sys.exit(130)
 """
-# Seconds that a process may be at work before it is ended, and a minute.
-LONGEST, LIMIT = 90.0, 60.0
+# Seconds that a process may be at work before it is ended, that it has to end by itself once it is
+# told to, as a job of the window has, and a minute.
+LONGEST, PATIENCE, LIMIT = 60.0, 8.0, 60.0
 
 
 def kills(samples: int, times: int, seed: int) -> Iterator[Row]:
@@ -76,7 +78,11 @@ def kills(samples: int, times: int, seed: int) -> Iterator[Row]:
                 child.wait(chance.uniform(5.0, LONGEST))
             except subprocess.TimeoutExpired:
                 at = time.time()
-                child.send_signal(signal.SIGKILL if how == "kill -9" else signal.SIGINT)
+                if how == "cancel":
+                    child.send_signal(signal.SIGINT)
+                    with contextlib.suppress(subprocess.TimeoutExpired):
+                        child.wait(PATIENCE)
+                child.kill()
                 child.wait()
             else:
                 break  # the capture is complete
@@ -126,7 +132,7 @@ def add(commands: Any) -> None:
     """Add the command to the parser of `python -m bench`."""
     c = commands.add_parser("kills", help="a capture is ended at random moments: what is lost")
     c.add_argument("--json", type=Path, default=Path("out/kills.json"))
-    c.add_argument("--samples", type=int, default=16384)
+    c.add_argument("--samples", type=int, default=8192)
     c.add_argument("--times", type=int, default=20)
     c.add_argument("--seed", type=int, default=0)
     c.set_defaults(run=_kills)

@@ -87,6 +87,8 @@ def _buttons(column: bpy.types.UILayout, context: bpy.types.Context, found: stat
     row.prop(scene.arto, "quality", text="")
     if scene.arto.quality == kinds.Quality.CUSTOM:
         row.prop(scene.arto, "samples", text="")
+    if found.kind == "ready":  # no line of its own: what is below must not jump
+        row.operator("arto.more_samples", text="", icon="ADD")
     big = column.row(align=True)
     big.scale_y = 1.6
     # the text of the button says what is to be done next
@@ -99,8 +101,6 @@ def _buttons(column: bpy.types.UILayout, context: bpy.types.Context, found: stat
         big.operator(beside)
     if found.stopped:
         big.operator("arto.discard_unfinished", text="", icon="TRASH")
-    if found.kind == "ready" and not found.goes_on:
-        column.operator("arto.more_samples", icon="ADD")
     works: tuple[Verb, ...] = ("capture", "shoot", "fit", "capture_frames", "more_samples")
     if not ended(column, context, works):
         lines = state.price(scene, found.goes_on) if found.kind != "blocked" else ()
@@ -164,6 +164,7 @@ class Quality(Draws):
         sub.prop(settings, "denoise")
         if denoise.known() is False:
             say(column, context, "This Blender was built without Open Image Denoise", "INFO")
+        column.operator("arto.more_samples", icon="ADD")
         column.prop(settings, "live_first")
         column.prop(settings, "lamps")
         if settings.lamps:
