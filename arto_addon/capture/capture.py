@@ -19,12 +19,13 @@ from ...core.capture.names import GROUP, group_name
 from ...core.capture.tile_entry import TileEntry, sums_of
 from ...core.errors import ArtoError, CaptureSetError, DeviceMemoryError, ExrError
 from ...core.files import Lock, whole
-from ...core.units import size
+from ...core.units import clock, size
 from ..blender.output import write_to
 from ..fit.guides import cleaned
 from ..shot import paths
 from ..shot.shot import shot_of
 from ..stage import takes
+from ..stage.small import threads
 from ..stage.stage import Stage
 from ..work import Progress, Render, Steps, Warned, Wrote, part_of
 from . import beside, draft, room
@@ -232,8 +233,13 @@ def _render_tiles(
             stream.start(number)
 
     try:
-        if shows:
-            yield from draft.draft(on, folder, head, around)
+        path = (yield from draft.draft(on, folder, head, around)) if shows else None
+        if path:
+            # by the planes and patterns of the tiles, which the looks did not have
+            head = _finer(folder, head, -1, path * (head.samples or 0), on)
+            heads.write(folder, head)
+            left = room.seconds_of(head, len(plan_of(head)[0]), path, on.pace, threads(on.scene))
+            yield Progress(0.0, f"this capture: about {clock(left)}, by its draft")
         t = -1
         while (t := t + 1) < len(head.tiles):
             entry, tiles = head.tiles[t], len(head.tiles)

@@ -30,7 +30,7 @@ from ...core.fit.fit import about_of, fit, fit_tile
 from ...core.patterns import pattern_set
 from ..blender.output import write_to
 from ..shot import paths, status
-from ..stage.small import small
+from ..stage.small import small, timed
 from ..stage.stage import Stage, picture_region, picture_size
 from ..work import Progress, Render, Steps, Warned, retold
 from .around import Around, plan_of
@@ -83,8 +83,10 @@ def _of_glance(seen: Glance, this: Asked, place: Path) -> None:
         writer.abandon()
 
 
-def draft(on: Stage, folder: Path, head: CaptureHead, around: Around) -> Steps[None]:
+def draft(on: Stage, folder: Path, head: CaptureHead, around: Around) -> Steps[float | None]:
     """Capture the draft of a capture and fit it, unless it is there or not worth its time.
+
+    Returns how many seconds a path of the capture takes, None where none was traced.
 
     folder: of the capture, with a head; around: its planes, which stay for the tiles. A render for
     which the memory is short is warned of, and the capture goes on without a draft. Raises
@@ -96,11 +98,12 @@ def draft(on: Stage, folder: Path, head: CaptureHead, around: Around) -> Steps[N
     there = status.draft_of(place, head.key)
     done = there is not None and there.hemicube == head.hemicube
     if done or len(renders) > 1 or not pixels or head.take:
-        return
+        return None
     try:
-        yield from _draft(on, folder, head, around, pixels, samples)
+        return (yield from _draft(on, folder, head, around, pixels, samples))
     except DeviceMemoryError as e:
         yield Warned(0.0, f"{e}. The capture goes on without a draft")
+        return None
     finally:
         marked.remove(folder / FOLDER, "capture", folder)
 
@@ -119,7 +122,7 @@ def size(head: CaptureHead) -> tuple[int, int]:
 
 def _draft(
     on: Stage, folder: Path, head: CaptureHead, around: Around, pixels: int, samples: int
-) -> Steps[None]:
+) -> Steps[float]:
     scene, there = on.scene, folder / FOLDER
     images = plan_of(head)[0]
     with small(on, samples, pixels):
@@ -132,13 +135,15 @@ def _draft(
         heads.write(there, mine)
         write_to(scene.render, there / name)
         request = Render(scene.name, 0.0, f"a draft of {width} x {height}", 0.0)
-        yield request
+        with timed() as laps:
+            yield request
         request.check()
     captured = CaptureSet(there)
     target = paths.draft_folder(folder.parent)
     for _ in fit(captured, target, *_choice(captured), draft=True):
         yield Progress(0.0, "fitting the draft")
     yield Progress(0.0, f"a draft of {width} x {height} is there")
+    return laps.tracing / (region.pixels * samples)
 
 
 def _choice(captured: CaptureSet) -> tuple[str, bool]:

@@ -6,10 +6,12 @@ import shutil
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from ...core.capture.head import CaptureHead
 from ...core.errors import SceneError
 from ...core.memory import memory
 from ...core.region import Region
 from ...core.units import clock, size
+from ..stage.stage import Pace
 
 # The share of the machine's memory that capture and fit may take by default. The rest is for
 # Blender, the scene and other programs.
@@ -114,6 +116,18 @@ def estimate(
         kept=field if fitted else images,
         renders=len(plan) * len(tiles),
     )
+
+
+def seconds_of(head: CaptureHead, images: int, path: float, pace: Pace | None, cores: int) -> float:
+    """Seconds that the tiles of a capture take that are not rendered yet.
+
+    images: of a render; path: seconds for one; pace: of the looks; cores: threads that render.
+    """
+    left = [tile.region.pixels for tile in head.tiles if not tile.done]
+    busy, again = (pace.busy, pace.again) if pace else (1.0, 0.0)
+    each = SAVING + (0.0 if head.kept else FITTING / cores)
+    tracing = (head.samples or 0) * path
+    return sum(left) * (tracing + images * each * busy) + len(left) * again
 
 
 def check_disk(folder: Path, needed: int, what: str) -> None:

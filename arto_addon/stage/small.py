@@ -60,7 +60,7 @@ def parts_of(
         write_to(on.scene.render, path)
         request = Render(on.scene.name, share, text, span)
         on.about_to_render()
-        with _timed() as laps:
+        with timed() as laps:
             yield request
         request.check()
         on.pace = laps.pace(on)
@@ -69,13 +69,18 @@ def parts_of(
             return {n: np.array(there.read(n)) for n in there.names if n.endswith(only)}
 
 
-class _Laps:
+class Laps:
     """When a render began, and when its first and last paths were traced: seconds, and seconds of
     all threads. scene_bytes: what the scene takes."""
 
     def __init__(self) -> None:
         self.begun = self.traced = self.written = _now()
         self.scene_bytes = 0
+
+    @property
+    def tracing(self) -> float:
+        """Seconds in which paths were traced."""
+        return self.written[0] - self.traced[0]
 
     def pace(self, on: Stage) -> Pace:
         """How fast the stage renders, by this render and those before it."""
@@ -119,9 +124,9 @@ def _bytes_in(says: str) -> int:
 
 
 @contextmanager
-def _timed() -> Iterator[_Laps]:
+def timed() -> Iterator[Laps]:
     """Time a render's stages, which Cycles' status lines tell apart."""
-    laps = _Laps()
+    laps = Laps()
     traced: list[tuple[float, float]] = []
 
     def told(*arguments: object) -> None:

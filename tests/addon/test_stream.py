@@ -168,7 +168,7 @@ def test_the_estimate_is_of_what_comes(tmp_path, monkeypatch):
         assert size <= found.kept < (most if keep == "always" else 1.15) * size
         assert found.seconds is not None and found.seconds > 0
     # and time is of getting ready, of paths and of images, at the pace of the small renders
-    monkeypatch.setattr(small._Laps, "pace", lambda *_: Pace(2.0, 0.5, 1e-5, 3.0))
+    monkeypatch.setattr(small.Laps, "pace", lambda *_: Pace(2.0, 0.5, 1e-5, 3.0))
     for seed, samples in enumerate((4, 4000), 1):
         scene.arto.samples, scene.arto.seed = samples, seed  # a scene that was not looked at
         found = work.run(capture.estimate(scene, scene.view_layers[0].name))
