@@ -19,11 +19,16 @@ from .fingerprint import Fingerprint
 REST = 0.3
 # By the type of an area, the region that panels are in.
 _PANELS = {"PROPERTIES": "WINDOW", "VIEW_3D": "UI", "IMAGE_EDITOR": "UI", "NODE_EDITOR": "UI"}
-_latest: dict[tuple[int, str], Fingerprint] = {}
-_asked: dict[tuple[int, str], Fingerprint] = {}
-_stale: set[tuple[int, str]] = set()
+# Of which scene, which view layer, and with what it will be compared: a shot's field and a capture
+# that was stopped may be of two states of a scene, and the panels ask for both.
+_Key = tuple[int, str, int]
+_latest: dict[_Key, Fingerprint] = {}
+_asked: dict[_Key, Fingerprint] = {}
+_stale: set[_Key] = set()
+# What was asked for since it was made last. What nobody asks for any more is not made anew.
+_wanted: set[_Key] = set()
 # The fingerprint that is being made, in pieces.
-_making: list[tuple[tuple[int, str], prints.Pieces]] = []
+_making: list[tuple[_Key, prints.Pieces]] = []
 # Seconds of the window's thread that are spent on pieces at a time, and seconds between two times.
 SLICE, PAUSE = 0.015, 0.01
 
@@ -36,13 +41,14 @@ def latest(
     then: the fingerprint that the latest will be compared with; now: make the fingerprint before
     returning, which takes a while.
     """
-    key = scene.session_uid, view_layer
     if now:
         prints.forget()  # Without a window, no handler has noted what changed.
         return prints.fingerprint(scene, view_layer, then)
     # By value: an equal fingerprint that was read anew is no reason to look again. Each look
     # redraws the panels, and the panels ask here.
-    if _asked.get(key) != then:
+    key = scene.session_uid, view_layer, hash(frozenset(then.items()))
+    _wanted.add(key)
+    if key not in _asked:
         _asked[key] = then
         _stale.add(key)
         _look_soon()
@@ -76,6 +82,7 @@ def _look() -> float | None:
             return PAUSE
         except StopIteration as end:
             _latest[key] = end.value
+            _wanted.discard(key)
         except (ReferenceError, KeyError):  # it was removed, which Blender has not reported yet
             _stale.add(key)
             _making.clear()
@@ -85,11 +92,11 @@ def _look() -> float | None:
     return None
 
 
-def _begin(key: tuple[int, str]) -> bool:
-    """Begin a fingerprint -> whether its scene and its view layer are still there."""
-    uid, view_layer = key
+def _begin(key: _Key) -> bool:
+    """Begin a fingerprint -> whether it is wanted, and its scene and view layer are there."""
+    uid, view_layer, _ = key
     scene = next((s for s in bpy.data.scenes if s.session_uid == uid), None)
-    if scene is None or view_layer not in scene.view_layers:
+    if scene is None or view_layer not in scene.view_layers or key not in _wanted:
         _latest.pop(key, None)
         _asked.pop(key, None)
         return False
@@ -183,5 +190,5 @@ def unregister() -> None:
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)
     pixels.begun = None
-    for kept in (_latest, _asked, _stale, _making):
+    for kept in (_latest, _asked, _stale, _wanted, _making):
         kept.clear()

@@ -91,3 +91,32 @@ def test_an_equal_fingerprint_is_not_looked_at_again(tmp_path):
         watch._stale.clear()
         watch.latest(scene, "ViewLayer", {"Object 'Floor'": then}, now=False)
         assert bool(watch._stale) == stale
+
+
+def _looked() -> None:
+    """Do what the window's timer does, to its end."""
+    while watch._look() is not None:
+        pass
+
+
+def test_two_states_that_are_compared_with_come_to_rest(tmp_path):
+    """A field and a capture that was stopped may be of two states of a scene. The panels ask for
+    both at each drawing, and a look ends in a drawing: both answers are there, and nothing is
+    looked at again."""
+    scene = small_scene(tmp_path)
+    watch.unregister()
+    both = {"Object 'Floor'": "a"}, {"Object 'Floor'": "b"}
+    for then in both:
+        assert watch.latest(scene, "ViewLayer", then, now=False) is None
+    _looked()
+    found = [watch.latest(scene, "ViewLayer", then, now=False) for then in both]
+    assert all(found) and not watch._stale
+    # a change makes both anew, but what nobody asks for any more is forgotten
+    watch._stale.update(watch._asked)
+    _looked()
+    assert len(watch._latest) == 2
+    watch.latest(scene, "ViewLayer", both[0], now=False)
+    watch._stale.update(watch._asked)
+    _looked()
+    assert len(watch._asked) == len(watch._latest) == 1
+    watch.unregister()
