@@ -23,6 +23,7 @@ from ..relight.relight import compute
 from ..relight.verify import verify_plate
 from ..shoot import shoot
 from ..stage.settings import samples_of
+from ..web.make import folder_of, make
 from ..work import Steps
 
 Verb = Literal[
@@ -40,6 +41,7 @@ Verb = Literal[
     "match",
     "even_out",
     "photographs",
+    "web",
 ]
 
 
@@ -76,6 +78,10 @@ def _relight_looks(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
     return (yield from relight_looks(scene, view_layer))[0]
 
 
+def _web(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
+    return (yield from make(scene, view_layer, folder_of(scene))).single
+
+
 def _capture(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
     return capture(scene, view_layer, shows=True)
 
@@ -102,5 +108,6 @@ VERBS: Mapping[Verb, Work] = {
     "composite": Work(save_composite, "compositing"),
     "match": Work(match_target, "looking for the light of"),
     "photographs": Work(read_and_relight, "reading the photographs of", captures=True),
+    "web": Work(_web, "making the page of"),
     "even_out": Work(even_out, "looking for even light on"),
 }

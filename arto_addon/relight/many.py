@@ -138,7 +138,7 @@ def _lent(
 
     turn: as a share of the whole circle.
     """
-    world = lent.enter_context(_world_showing(file)) if file else None
+    world = lent.enter_context(world_showing(file)) if file else None
     if turn:
         world = world or check_world(scene, view_layer)
         world = lent.enter_context(turned(scene, view_layer, world, turn * math.tau))
@@ -164,7 +164,7 @@ def frames_of(scene: bpy.types.Scene) -> range:
 
 
 @contextmanager
-def _world_showing(file: Path) -> Iterator[bpy.types.World]:
+def world_showing(file: Path) -> Iterator[bpy.types.World]:
     """A world that shows an environment map from a file. Raises SceneError."""
     if not file.is_file():
         raise SceneError(f"there is no environment map {file}")

@@ -142,7 +142,7 @@ def finish(
     lap = ready.laps.lap
     summed, least, signed = [], 0.0, False
     for take, picture, parts in zip(shown.takes, pictures, ready.rendered, strict=True):
-        parts, least, signed = yield from _with_own(take, ready, picture, parts)
+        parts, least, signed = yield from with_own(take, ready, picture, parts)
         summed.append(parts)
     by, held = shown.takes, 0.0
     if len(by) > 1:
@@ -214,7 +214,7 @@ def check_finite(picture: NDArray | float, name: str) -> None:
     )
 
 
-def _with_own(
+def with_own(
     shown: Shown, ready: Ready, picture: NDArray[np.float32], parts: list[NDArray[np.float32]]
 ) -> Steps[tuple[list[NDArray[np.float32]], NDArray[np.float32] | float, bool]]:
     """Add the scene's own lamps to a take's picture.

@@ -13,6 +13,7 @@ from ..plate.names import relit_file
 from ..plate.plate import name_of, show, shown_file
 from ..relight.finished import finish_plate
 from ..relight.verify import verify_plate
+from ..web.make import check, folder_of, make, page_of
 from ..work import Steps
 from .long_work import LongWork
 from .operators import Quick, free
@@ -119,7 +120,49 @@ without rendering"""
         return save_composite(scene, view_layer)
 
 
+class ARTO_OT_web(LongWork):
+    """Make a page for a browser, beside the plate, in which anyone turns the light of the shot: \
+the worlds of its looks, or its own"""
+
+    bl_idname = "arto.web"
+    bl_label = "Web Page"
+    verb = "web"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return free(cls) and _has_plate(cls, context)
+
+    def check(self, scene: bpy.types.Scene) -> None:
+        check(folder_of(scene))
+
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps[object]:
+        return make(scene, view_layer, folder_of(scene))
+
+
+class ARTO_OT_open_page(Quick):
+    """Open the page of the shot in the browser"""
+
+    bl_idname = "arto.open_page"
+    bl_label = "Open Page"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not _has_plate(cls, context):
+            return False
+        if not page_of(context.scene).is_file():
+            cls.poll_message_set("There is no page yet: press Web Page")
+            return False
+        return True
+
+    def work(self, context: bpy.types.Context) -> str:
+        path = page_of(context.scene)
+        bpy.ops.wm.url_open(url=path.as_uri())
+        return f"opened {path.name}"
+
+
 CLASSES = (
+    ARTO_OT_web,
+    ARTO_OT_open_page,
     ARTO_OT_show_plate,
     ARTO_OT_compare,
     ARTO_OT_verify,

@@ -31,6 +31,7 @@ WORKS: tuple[Verb, ...] = (
     "verify",
     "finish",
     "composite",
+    "web",
 )
 # Seconds for which the line about the plate is kept: a panel is drawn at every mouse move.
 _HOLDS = 0.4
@@ -125,6 +126,9 @@ class Result(Draws):
         column.separator(factor=0.5)
         column.prop(settings, "use_in_compositor", text="")
         column.operator("arto.save_composite", icon="FILE_TICK")
+        row = column.row(align=True)
+        row.operator("arto.web", icon="URL")
+        row.operator("arto.open_page", icon="WINDOW")
         if path:
             say(column, context, home.relative(path), "FILE_IMAGE")
 

@@ -61,6 +61,8 @@ Scene Lamps Too | Auch Lampen der Szene | シーンのランプも
 Near | Nah | 近さ
 White Balance | Weißabgleich | ホワイトバランス
 Save Composite | Composite speichern | 合成を保存
+Web Page | Webseite | Webページ
+Open Page | Seite öffnen | ページを開く
 Open HDRI | HDRI öffnen | HDRIを開く
 Use This HDRI | Dieses HDRI verwenden | このHDRIを使う
 More HDRIs | Weitere HDRIs | 他のHDRI

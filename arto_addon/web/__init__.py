@@ -1,0 +1,1 @@
+"""A page for a browser in which anyone turns the light of a shot."""
