@@ -299,6 +299,74 @@ def test_what_the_buttons_do_with_a_shot(walk: Walk) -> None:
     assert "Traceback" not in w.printed
 
 
+SUN = """
+import numpy
+live = next(m for n, m in sys.modules.items() if n.endswith(".arto_addon.live.live"))
+sky = next(n for n in scene.world.node_tree.nodes if n.type == "TEX_ENVIRONMENT")
+before = sky.image, scene.world.arto.rotation, scene.cycles.samples
+sunny = numpy.full((64, 128, 4), 0.05, numpy.float32)
+sunny[46:48, 30:32, :3], sunny[..., 3] = 300.0, 1.0
+sky.image = bpy.data.images.new("Sunny", 128, 64, float_buffer=True)
+sky.image.pixels.foreach_set(sunny.ravel())
+sky.image.update()
+sky.image.pack()
+scene.arto.lamps, scene.arto.live_finish, scene.arto.compare = True, False, "OFF"
+scene.cycles.samples = 16
+bpy.context.window_manager.arto.live = True
+
+def keep(path):
+    image = bpy.data.images["ARTO Live"]
+    pixels = numpy.empty(len(image.pixels), numpy.float32)
+    image.pixels.foreach_get(pixels)
+    numpy.save(path, pixels.reshape(image.size[1], image.size[0], 4)[::-1, :, :3])
+
+def render(path):
+    output = scene.render.image_settings
+    were = output.file_format, output.color_depth, scene.render.filepath
+    output.file_format, output.color_depth, scene.render.filepath = "OPEN_EXR", "32", path
+    bpy.ops.render.render(write_still=True, scene=scene.name)
+    output.file_format, output.color_depth, scene.render.filepath = were
+"""
+SUN_AWAY = """
+bpy.context.window_manager.arto.live = False
+sky.image, scene.world.arto.rotation, scene.cycles.samples = before
+scene.arto.lamps = False
+bpy.data.images.remove(bpy.data.images["Sunny"])
+"""
+
+
+def test_a_sun_that_is_turned_live_moves_its_shadow(walk: Walk) -> None:
+    """The picture at rest is what Cycles renders of that state, and one Blender makes them all."""
+    w, folder = walk.w, walk.blend.parent
+    w.do(SUN)
+    shown, rendered, beside = [], [], []
+    for i, turn in enumerate((0.3, 2.0)):
+        w.do(f"scene.world.arto.rotation = {turn}")
+        now = f"live.current._now and abs(live.current._now.turn - {turn}) < 1e-3"
+        w.wait(f"{now} and live.current.settled and live.current.shows_suns", 240)
+        there = "live.current.asking.suns.picture.turn == live.current._now.turn"
+        w.wait(f"{there} and live.current.settled and live.current.shows_suns", 240)
+        assert w.get("live.current.trouble") == ""
+        beside.append(w.get("live.current.asking.resident.process.pid"))
+        w.do(f"keep({str(folder / f'live{i}.npy')!r})")
+        w.do(f"render({str(folder / f'cycles{i}.exr')!r})", 240)
+        shown.append(np.load(folder / f"live{i}.npy"))
+        rendered.append(exr.read(folder / f"cycles{i}.exr")["Combined"][..., :3])
+    w.do(SUN_AWAY)
+    assert beside[0] == beside[1]
+
+    def off(a: np.ndarray, b: np.ndarray) -> float:
+        return float(np.abs(a - b).mean() / b.mean())
+
+    for i in (0, 1):
+        # noise of a few samples in one, and the shadow elsewhere in the other
+        assert off(shown[i], rendered[i]) < 0.5 * off(shown[1 - i], rendered[i])
+    w.do("bpy.ops.wm.read_homefile(use_empty=True)")
+    ended(beside[0])  # the file that is closed takes the renderer with it
+    w.do(f"bpy.ops.wm.open_mainfile(filepath={str(walk.blend)!r})")
+    w.do("scene = bpy.context.scene")
+
+
 OFF_AND_ON = """
 import addon_utils
 name = next(a.module for a in bpy.context.preferences.addons if a.module.endswith(".arto"))

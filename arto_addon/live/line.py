@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ...core.units import clock
+from ...core.units import clock, size
 from ..blender.words import tr
 from .viewer import Drawn
 
@@ -26,12 +26,23 @@ def lacking(scene: bpy.types.Scene, held: bool, behind: bool, suns: float) -> li
     return lacks
 
 
-def line(scene: bpy.types.Scene, shown: Drawn, lacks: list[str], took: float | None) -> str:
-    """The line. lacks: see `lacking`; took: how long the last finishing took, in seconds."""
+def line(
+    scene: bpy.types.Scene, shown: Drawn, lacks: list[str], took: float | None, beside: int = 0
+) -> str:
+    """The line.
+
+    lacks: see `lacking`; took: how long the last finishing took, in seconds; beside: bytes that the
+    resident renderer takes.
+    """
     if shown.factor > 1:
         return tr("1/{factor} of the size, after {s:.2f} s", factor=shown.factor, s=shown.latency)
     if not lacks:
-        return tr("Whole, after {s:.2f} s", s=shown.latency)
+        said = tr("Whole, after {s:.2f} s", s=shown.latency)
+        if shown.wish.clean is not None:
+            said = tr("Whole and denoised")
+        if not beside:
+            return said
+        return tr("{said}; the renderer beside takes {size}", said=said, size=size(beside))
     said = tr("Whole, without {lacks}", lacks=", ".join(lacks))
     if not scene.arto.live_finish:
         return tr("{said}: Relight adds this", said=said)

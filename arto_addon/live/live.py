@@ -116,12 +116,14 @@ class Live:
             if not self.opened.draft:
                 suns = shown.suns if shown.wish.suns is None else 0.0
                 lacks = lacking(scene, self.opened.held, self.behind, suns)
-                self.line = line(scene, shown, lacks, self.finishing.took)
+                self.line = line(
+                    scene, shown, lacks, self.finishing.took, self.asking.resident.bytes
+                )
             redraw()
             watch.redraw()
         said = self.maps.trouble_with(self._now.key) if self._now else ""
         trouble = self.film or self.problem or said or self.viewer.trouble or self.finishing.failed
-        trouble = trouble or self.asking.suns.trouble
+        trouble = trouble or self.asking.suns.said
         if place_of(scene) != self._shot:
             trouble = other_shot(self._shot, place_of(scene))
         if trouble != self.trouble:

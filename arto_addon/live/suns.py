@@ -106,7 +106,15 @@ class Suns:
     @property
     def usable(self) -> bool:
         """Whether suns can be rendered."""
-        return self._file is not None and not self.why and not self.trouble
+        able = self._file is not None and not self.why and not self.trouble
+        return able and not self._resident.short
+
+    @property
+    def said(self) -> str:
+        """Why there are no live suns, where the artist has to be told; else empty."""
+        if self._file is not None and self._resident.short:
+            return f"{self._resident.short}: a relight renders the suns"
+        return self.trouble
 
     def of(self, key: str) -> Picture | None:
         """The newest picture of the suns of a world."""

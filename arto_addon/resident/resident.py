@@ -67,6 +67,8 @@ class Resident:
         self._told = False
         # why the last process ended by itself, and how much memory it took at its last answer
         self.ended, self.bytes = "", 0
+        # why the scene is not to be prepared again: there was too little memory for it
+        self.short = ""
 
     def start(self) -> None:
         """Start the second Blender. Raises SceneError where it cannot be started."""
@@ -185,6 +187,8 @@ class Resident:
             if process is not self.process:
                 return
             self.ended, self.bytes = ended or how, 0
+            if ended.startswith(SHORT):
+                self.short = ended
         self._answered(Said({}, "" if ended else f"the Blender beside ended ({how})", bool(ended)))
 
     def _answered(self, said: Said) -> None:

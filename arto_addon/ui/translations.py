@@ -161,6 +161,8 @@ The camera has moved since | Die Kamera hat sich seither bewegt | カメラが�
 Captured of the view layer {then}, this is {now} | Aufgenommen vom View-Layer {then}, dies ist {now} | ビューレイヤー {then} でキャプチャ、現在は {now}
 1/{factor} of the size, after {s:.2f} s | 1/{factor} der Größe, nach {s:.2f} s | 1/{factor} サイズ、{s:.2f} 秒後
 Whole, after {s:.2f} s | Ganz, nach {s:.2f} s | 全体、{s:.2f} 秒後
+Whole and denoised | Ganz und entrauscht | 全体、ノイズ除去済み
+{said}; the renderer beside takes {size} | {said}; der Renderer daneben braucht {size} | {said}（別レンダラーのメモリ: {size}）
 Whole, without {lacks} | Ganz, ohne {lacks} | 全体、{lacks} なし
 its brightness | seine Helligkeit | 明るさ
 the world behind | die Welt dahinter | 背後のワールド
