@@ -36,7 +36,9 @@ COMPRESSIONS = (
     "NO", "RLE", "ZIPS", "ZIP", "PIZ", "PXR24", "B44", "B44A", "DWAA", "DWAB", "HTJ2K256",
     "HTJ2K32",
 )  # fmt: skip
-_LINES = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256, 256, 32)
+LINES: dict[str, int] = dict(
+    zip(COMPRESSIONS, (1, 1, 1, 16, 32, 16, 32, 32, 32, 256, 256, 32), strict=True)
+)
 _BOX = b"box2i"
 _PIXEL_BYTES = {0: 4, 1: 2, 2: 4}
 # Kind and value of each attribute of a header, by its name.
@@ -96,7 +98,7 @@ class PartLayout:
         """Lines of pixels in a chunk, or in a row of tiles."""
         if self.tiles:
             return self.tiles[1]
-        return _LINES[self.compression] if self.compression < len(_LINES) else 1
+        return LINES.get(self.packing, 1)
 
 
 def parsed(data: mmap.mmap | bytes) -> tuple[list[PartLayout], int]:
@@ -224,8 +226,8 @@ def _part(found: Attributes, multipart: bool, tiled: bool) -> PartLayout:
         raise LayoutError(f"it cannot be {width}x{height} pixels")
     if tiles:
         chunks = _tile_count(width, height, *tiles)
-    elif compression < len(_LINES):
-        chunks = -(-height // _LINES[compression])
+    elif compression < len(COMPRESSIONS):
+        chunks = -(-height // LINES[COMPRESSIONS[compression]])
     else:
         chunks = said_chunks
     if chunks is None or chunks < 1 or (multipart and said_chunks not in (None, chunks)):

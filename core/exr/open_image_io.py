@@ -13,6 +13,7 @@ from __future__ import annotations
 import importlib.machinery
 import importlib.util
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -23,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ExrError
-from .head import PartLayout
+from .head import LINES, PartLayout
 from .window import Box
 
 _MODULE = "OpenImageIO"
@@ -32,9 +33,10 @@ _BAND_BYTES = 1 << 22
 # Kinds of channels as OpenImageIO calls them, by their numbers in a file.
 _KINDS = ("uint", "half", "float")
 _TYPES = {"uint": np.uint32, "half": np.float16, "float": np.float32}
-# The most channels of a part that it reads; it asks for leave from a quarter of them on.
-_MOST_CHANNELS = 1 << 12
-_LIMIT = "limits:channels"
+# The most channels of a part that it reads, and those that it opens without being told to. The
+# limit is that of the process: one thread changes it at a time, and puts it back.
+_MOST_CHANNELS, _ASKS_FROM = 1 << 12, 1 << 8
+_LIMIT, _ASKING = "limits:channels", threading.Lock()
 
 
 def imported(folders: Sequence[Path]) -> ModuleType:
@@ -150,7 +152,7 @@ class OpenImageIo:
                     raise OSError(file.geterror())
                 planes = list(part.values())
                 kind = np.result_type(*planes)
-                step = _band(spec.width * len(planes) * kind.itemsize, 256)
+                step = _band(spec.width * len(planes) * kind.itemsize, LINES[compression])
                 for y in range(0, spec.height, step):
                     end = min(y + step, spec.height)
                     band = np.empty((end - y, spec.width, len(planes)), kind)
@@ -231,15 +233,16 @@ class OpenImageIo:
     @contextmanager
     def _leave_for(self, channels: int) -> Iterator[None]:
         """Let OpenImageIO open a file of so many channels in a part."""
-        before = self._module.get_int_attribute(_LIMIT)
-        if channels <= before:
+        if channels <= _ASKS_FROM:
             yield
             return
-        self._module.attribute(_LIMIT, channels)
-        try:
-            yield
-        finally:
-            self._module.attribute(_LIMIT, before)
+        with _ASKING:
+            before = self._module.get_int_attribute(_LIMIT)
+            self._module.attribute(_LIMIT, max(channels, before))
+            try:
+                yield
+            finally:
+                self._module.attribute(_LIMIT, before)
 
 
 def _band(line_bytes: int, lines: int) -> int:

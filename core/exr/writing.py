@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from ..errors import ExrError
 from ..files import whole
 from .attributes import encoded_head
-from .head import LayoutError
+from .head import LINES, LayoutError
 from .layout import put_heads
 from .library import chosen
 from .opening import check_name, headers
@@ -233,6 +233,8 @@ def _write(
 ) -> None:
     if len({plane.shape for _, planes in parts for plane in planes.values()}) > 1:
         raise ExrError(f"{path} was not written: its layers have different sizes")
+    if compression not in LINES:
+        raise ExrError(f"{path} was not written: {compression!r} is no compression of EXR files")
     check_name(path)
     parts, windows = window.put(parts)
     height, width = next(iter(parts[0][1].values())).shape
