@@ -16,7 +16,7 @@ from ...core.capture.kinds import Keep, Route
 from ...core.errors import FilesError, PhotographsError, SceneError
 from ...core.files import Lock, replace_folder, write_text
 from ...core.fit.fit import fit
-from ...core.photographs import dome_set, held_out, monitor_set
+from ...core.photographs import agree, dome_set, held_out, monitor_set
 from ...core.photographs.description import Kind
 from ...core.photographs.dome_set import Written
 from ...core.photographs.opened import Photographs
@@ -141,6 +141,8 @@ def _held_out(photos: Photographs, found: Written, folder: Path) -> Steps[None]:
     """Predict each lamp from the others, and write down how well that went."""
     yield Progress(FITTED, "predicting each lamp from the others")
     pictures, weight = dome_set.small_pictures(photos)
+    if said := agree.turned(pictures, found.lamps.directions, weight):
+        yield Warned(FITTED, said)
     told = held_out.of_dome(pictures, found.lamps, weight)
     if told is None:
         return

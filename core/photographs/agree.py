@@ -25,6 +25,8 @@ from .curve import FULL, Curve, srgb
 DARK, BRIGHT = 0.4, 0.1
 # The fewest lamps, and how much better linear values must agree to be taken for light.
 FEWEST, BETTER = 6, 0.8
+# How a lamp's direction and the middle of its light go together, where an axis is turned round.
+TURNED = -0.7
 # Pixels that have to tell, and how bright they are in some lamp's light.
 PIXELS, SEEN = 100, 0.1
 
@@ -89,3 +91,40 @@ def why_light(values: NDArray, directions: NDArray, strengths: NDArray) -> str:
         "the photographs' values are taken for light, without a curve: so they agree with the "
         f"lamps' directions to {as_light:.1%}, and with the curve of sRGB to {as_srgb:.1%}"
     )
+
+
+def turned(pictures: NDArray, directions: NDArray, weight: NDArray) -> str:
+    """Say whether directions look as if an axis of theirs were turned round.
+
+    What stands out from its ground is brighter on the side of the lamp.
+
+    Parameters
+    ----------
+    pictures : (K, H, W, 3) float
+        The light of each lamp.
+    directions : (K, 3) float
+        Of length 1: x right, y up, z towards the camera.
+    weight : (H, W) float
+        How much a pixel is the thing.
+
+    Returns
+    -------
+    str
+        Empty where they look right, or too few lamps tell.
+    """
+    grey = np.nan_to_num(pictures.sum(axis=-1)) * weight
+    total = grey.sum(axis=(1, 2))
+    lit = total > 0.1 * max(float(total.max(initial=0)), 1e-30)
+    if lit.sum() < FEWEST:
+        return ""
+    y, x = np.mgrid[: grey.shape[1], : grey.shape[2]]
+    for name, where, there in (("x", x, directions[lit, 0]), ("y", -y, directions[lit, 1])):
+        middle = (grey[lit] * where).sum(axis=(1, 2)) / total[lit]
+        if there.std() > 0.1 and middle.std() > 1e-6:
+            alike = float(np.corrcoef(middle, there)[0, 1])
+            if alike < TURNED:
+                return (
+                    f"the lamps' directions look turned round in {name}: the side away from a lamp "
+                    "is the brighter one. x is to the right of the picture, y up in it"
+                )
+    return ""

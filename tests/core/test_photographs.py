@@ -17,7 +17,7 @@ from arto.core.fit.fit import fit
 from arto.core.light.environment import Environment, sample_directions
 from arto.core.light.environment import directions as directions_of
 from arto.core.light.light import PatchLight
-from arto.core.photographs import ball, curve, dome_set, held_out, lamps
+from arto.core.photographs import agree, ball, curve, dome_set, held_out, lamps
 from arto.core.photographs.description import Description, Kind, Lamp, Photograph
 from arto.core.photographs.opened import Photographs
 from arto.core.photographs.reader import InMemory, Picture
@@ -204,6 +204,14 @@ def test_a_held_out_lamp_of_a_diffuse_sphere_is_predicted() -> None:
     pictures[2] *= 2
     again = held_out.held_out(pictures, directions, INSIDE.astype(float))
     assert again is not None and max(again.rows, key=lambda r: r.gain).lamp == 2
+
+
+def test_directions_that_are_upside_down_are_told() -> None:
+    directions = around(12, 0.4)
+    pictures = np.stack([lambert(d) for d in directions])
+    assert agree.turned(pictures, directions, INSIDE) == ""
+    assert "turned round in y" in agree.turned(pictures, directions * (1, -1, 1), INSIDE)
+    assert "turned round in x" in agree.turned(pictures, directions * (-1, 1, 1), INSIDE)
 
 
 def test_a_dome_is_relit_as_the_thing_would_be(tmp_path: Path) -> None:
