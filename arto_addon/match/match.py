@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core import exr
+from ...core.capture.kinds import Route
 from ...core.errors import TargetError
 from ...core.field.field import Field
 from ...core.match import ask, gains
@@ -211,7 +212,9 @@ def steps(
 def can_render(scene: bpy.types.Scene, field: Field) -> bool:
     """Whether lamps can be rendered by themselves, as the plate of a match has them."""
     about = field.about
-    return scene.arto.lamps and about.far is not False and about.view_layer is not None
+    if about.route == Route.PHOTOGRAPHS or not scene.arto.lamps:
+        return False
+    return about.far is not False and about.view_layer is not None
 
 
 def said(done: Matched, words: str = "") -> str:

@@ -68,8 +68,8 @@ def open_scene(folder: Path, world: bpy.types.World | None) -> tuple[bpy.types.S
     render.resolution_percentage = 100
     # what is not the thing shows what is put behind it
     render.film_transparent = True
-    # no path tracer made the noise of photographs
-    scene.arto.denoise = False
+    # no path tracer made the noise of photographs, and none can render suns on the thing
+    scene.arto.denoise = scene.arto.lamps = False
     _add_camera(scene, photos)
     return scene, photos
 

@@ -249,9 +249,10 @@ def _lamps(shown: Shown, found: Split) -> Steps[tuple[list[NDArray[np.float32]],
     -> (pictures, none or one; what was done, in words; whether the lamps have nearly all the light)
     """
     settings, about = shown.scene.arto, shown.field.about
-    if not settings.lamps or not found.worth:
+    photographed = about.route == Route.PHOTOGRAPHS
+    if not found.worth or not (settings.lamps or photographed):
         return [], "no", False
-    if about.route == Route.PHOTOGRAPHS:
+    if photographed:
         lamps = "no: a photographed thing cannot be rendered; suns shine by the patches they are in"
     elif about.far is False:
         lamps = "no: lamps at infinity would not stand where a near hemicube has them"

@@ -92,8 +92,12 @@ def _live(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
         slot(column, context, "Follows the world as you change it")
     else:
         slot(column, context, "Capture the shot to see it live", "INFO")
-    column.prop(scene.arto, "lamps")
-    if scene.arto.lamps:
+    row = column.row()
+    row.enabled = not scene.arto.photographs
+    row.prop(scene.arto, "lamps")
+    if scene.arto.photographs:
+        slot(column, context, "Suns shine by the patches: a photographed thing is not rendered")
+    elif scene.arto.lamps:
         slot(column, context, lamps_line(scene), lines=1)
 
 

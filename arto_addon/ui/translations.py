@@ -25,6 +25,7 @@ Capture This Too | Auch aufnehmen | これもキャプチャ
 Continue | Fortsetzen | 続行
 Set Back | Zurückstellen | 元に戻す
 Open Photographs | Fotos öffnen | 写真を開く
+Suns shine by the patches: a photographed thing is not rendered | Sonnen scheinen durch die Felder: Fotografiertes wird nicht gerendert | 太陽はパッチで照らします: 撮影されたものはレンダーできません
 Read Again | Neu einlesen | 再読み込み
 Ready, read {when}, {patches} patches | Bereit, eingelesen {when}, {patches} Felder | 準備完了、読み込み {when}、{patches} パッチ
 The photographs are not read yet | Die Fotos sind noch nicht eingelesen | 写真はまだ読み込まれていません

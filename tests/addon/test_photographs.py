@@ -11,8 +11,8 @@ from arto.arto_addon import work
 from arto.arto_addon.capture.check import check_scene
 from arto.arto_addon.photographs import opening
 from arto.arto_addon.photographs.read import TABLE, WORST, read_photographs
-from arto.arto_addon.plate.verify import verify_plate
 from arto.arto_addon.relight.relight import compute
+from arto.arto_addon.relight.verify import verify_plate
 from arto.arto_addon.shot import paths
 from arto.arto_addon.shot.shot import layer_of
 from arto.arto_addon.ui import cli, state
