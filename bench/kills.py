@@ -56,7 +56,7 @@ except work.CancelledError:
 """
 # Seconds that a process may be at work before it is ended, that it has to end by itself once it is
 # told to, as a job of the window has, and a minute.
-LONGEST, PATIENCE, LIMIT = 60.0, 8.0, 60.0
+LONGEST, PATIENCE, LIMIT = 150.0, 8.0, 60.0
 
 
 def kills(samples: int, times: int, seed: int) -> Iterator[Row]:
