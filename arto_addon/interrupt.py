@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,6 +19,9 @@ from dataclasses import dataclass
 
 import bpy
 from bpy.app.handlers import persistent
+
+# What is said at a Ctrl-C that cannot end a render.
+SOON = "ARTO: stopping once this render is done; Ctrl-C again ends at once"
 
 
 @dataclass
@@ -31,12 +35,18 @@ class Interrupts:
 def noted() -> Iterator[Interrupts]:
     """Note every Ctrl-C for the time of a piece of work.
 
-    Nothing is noted where Python itself answers Ctrl-C, as it does for Blender as a module, nor on
-    Windows, nor outside the main thread.
+    Where Python itself answers Ctrl-C, as it does for Blender as a module, a render goes on to its
+    end, and the work ends after it. Nothing is noted where another program's own handler answers,
+    by Blender's program on Windows, nor outside the main thread.
     """
     told = Interrupts()
+    main = threading.current_thread() is threading.main_thread()
+    if main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        with _noted_by_python(told):
+            yield told
+        return
     ours = signal.getsignal(signal.SIGINT) is None and os.name == "posix"
-    if not ours or threading.current_thread() is not threading.main_thread():
+    if not ours or not main:
         yield told
         return
     library = ctypes.CDLL(None)
@@ -90,3 +100,25 @@ def noted() -> Iterator[Interrupts]:
         os.close(mouth)
         listener.join()
         os.close(ear)
+
+
+@contextmanager
+def _noted_by_python(told: Interrupts) -> Iterator[None]:
+    """Note Ctrl-C in place of Python, which would raise an error in whatever runs.
+
+    That may be a handler that Blender calls in the midst of a render, where the error would be lost
+    or end the process. A second Ctrl-C ends the process at once.
+    """
+
+    def note(*_: object) -> None:
+        if told.came:
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
+            signal.raise_signal(signal.SIGINT)
+        told.came = True
+        print(SOON, file=sys.stderr, flush=True)
+
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -11,6 +11,7 @@ import numpy as np
 from arto.arto_addon.kit import kit as kits
 from arto.core.kit.light import Blend, Kind, Light
 from arto.core.kit.model import Base, BaseKind, Kit
+from arto.core.kit.presets import PRESETS, preset
 
 from .behind_cases import CASES
 from .field_cases import case
@@ -40,6 +41,10 @@ def _of_light(scene: bpy.types.Scene, light: Light) -> None:
     _has(scene, Kit((light,), _DAY))
 
 
+def _of_preset(scene: bpy.types.Scene, name: str) -> None:
+    _has(scene, preset(name))
+
+
 def _of_blend(scene: bpy.types.Scene, blend: Blend) -> None:
     front = replace(LIGHTS["round"], name="b", blend=blend, strength=0.5, azimuth=-45.0)
     _has(scene, Kit((LIGHTS["rectangle"], front), _DAY))
@@ -47,6 +52,8 @@ def _of_blend(scene: bpy.types.Scene, blend: Blend) -> None:
 
 for _name, _light in LIGHTS.items():
     CASES[f"kit of a {_name}"] = "four_spheres", partial(_of_light, light=_light)
+for _name in PRESETS:
+    CASES[f"kit of the preset {_name}"] = "four_spheres", partial(_of_preset, name=_name)
 for _blend in Blend:
     _words = f"kit with a light of the blend {_blend.value.lower()}"
     CASES[_words] = "four_spheres", partial(_of_blend, blend=_blend)

@@ -9,6 +9,7 @@ import bpy
 
 from ...core.errors import KitError
 from ...core.kit.model import Base, BaseKind
+from ..blender import sequences
 from ..blender.nodes import shader_tree
 from ..blender.reached import origin
 from . import groups
@@ -92,6 +93,8 @@ def image_of(text: str) -> bpy.types.Image:
     path = Path(bpy.path.abspath(text))
     if not path.is_file():
         raise KitError(f"the image '{text}' is neither in this file nor on disk: choose another")
+    if wrong := sequences.incomplete(path):
+        raise KitError(f"{wrong}: copy the image anew, or choose another")
     try:
         return bpy.data.images.load(str(path), check_existing=True)
     except RuntimeError as e:

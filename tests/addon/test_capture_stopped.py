@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import signal
 import subprocess
 
 import numpy as np
@@ -199,3 +200,25 @@ def test_tiles_are_cut_finer_where_they_take_longer_than_planned(tmp_path, monke
     # and not where all is as it was planned
     monkeypatch.setattr(plan, "KEPT", 1e6)
     assert plan.finer(list(two.regions), 1.0, 0.0, 1) == list(two.regions)
+
+
+def test_ctrl_c_in_the_module_ends_between_two_steps(capsys) -> None:
+    """Python's own answer, an error in the midst of a render, would end the process."""
+    before = signal.getsignal(signal.SIGINT)
+    left = []
+
+    def steps() -> work.Steps[None]:
+        try:
+            yield work.Progress(0.0, "one")
+            signal.raise_signal(signal.SIGINT)
+            left.append("goes on after Ctrl-C")
+            yield work.Progress(0.5, "two")
+            left.append("is never reached")
+        finally:
+            left.append("put back")
+
+    with pytest.raises(CancelledError):
+        work.run(steps())
+    assert left == ["goes on after Ctrl-C", "put back"]
+    assert signal.getsignal(signal.SIGINT) is before
+    assert "stopping" in capsys.readouterr().err

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 
 import bpy
@@ -19,6 +20,7 @@ from arto.arto_addon.live.quick import Quick
 from arto.arto_addon.relight import kit_out
 from arto.arto_addon.ui import cli
 from arto.arto_addon.ui.kit_operators import chosen, facing
+from arto.arto_addon.ui.report import CODES
 from arto.arto_addon.world import dials
 from arto.arto_addon.world.bake import bake
 from arto.arto_addon.world.kept import shows
@@ -180,6 +182,28 @@ def test_scripts_light_by_lists(scene, tmp_path, capsys) -> None:
     theirs.write_text("{}")
     assert cli.main(["light", "--json", str(theirs), "--write"]) == 1
     assert theirs.read_text() == "{}"
+    # what is no file is neither read, waited for nor replaced
+    folder = tmp_path / "folder.exr"
+    folder.mkdir()
+    pipe = tmp_path / "pipe.exr"
+    os.mkfifo(pipe)
+    capsys.readouterr()
+    for one in (folder, pipe):
+        assert cli.main(["light", "--json", str(one)]) == CODES["wrong options"]
+        assert cli.main(["light", "--hdri", str(one), "--write"]) == 1
+    assert "no kit" not in capsys.readouterr().err
+    assert folder.is_dir() and pipe.is_fifo()
+
+
+def test_a_kit_with_a_cut_off_hdri_is_told_as_it_is_read(scene, tmp_path, capsys) -> None:
+    sky = tmp_path / "sky.exr"
+    exr.write(sky, {"": np.ones((64, 128, 3), np.float32)})
+    path = tmp_path / "kit.json"
+    kit_file.save(Kit((), Base(BaseKind.HDRI, str(sky))), path)
+    sky.write_bytes(sky.read_bytes()[:-200])
+    assert cli.main(["light", "--json", str(path)]) == 1
+    assert "sky.exr" in capsys.readouterr().err
+    assert kits.read(scene.world) == Kit((KEY,))
 
 
 def test_live_s_own_map_is_that_of_cycles(scene) -> None:

@@ -1,11 +1,13 @@
-"""A .blend that was cut off by a full disk is told."""
+"""A .blend, or a render, that was cut off by a full disk is told."""
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import bpy
 import pytest
-from arto.arto_addon.blender import saving
-from arto.core.errors import SceneError
+from arto.arto_addon.blender import saving, scratch
+from arto.core.errors import ExrError, FilesError, SceneError
 
 
 @pytest.mark.parametrize("packed", [False, True])
@@ -26,3 +28,11 @@ def test_a_blend_without_its_end_is_told(tmp_path, packed: bool) -> None:
     if packed:
         path.write_bytes(data[:1000] + data[1010:])
         assert not saving.is_whole(path)
+
+
+@pytest.mark.parametrize("left", [0, 2**30])
+def test_a_full_disk_is_no_damaged_file(monkeypatch, left: int) -> None:
+    monkeypatch.setattr(scratch.shutil, "disk_usage", lambda _: SimpleNamespace(free=left))
+    with pytest.raises(ExrError if left else FilesError, match="cut" if left else "is full"):  # noqa: SIM117
+        with scratch.temporary():
+            raise ExrError("it is cut off")
