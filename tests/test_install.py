@@ -18,7 +18,7 @@ from program_tools import Program, said
 from tools import package
 
 # What a zip of text and pictures may hold: no library, no wheel, no other archive.
-KINDS = {".py", ".toml", ".md", ".js", ".png", ""}
+KINDS = {".py", ".toml", ".md", ".js", ".css", ".html", ".png", ""}
 # Of a tagline and of what a permission is for: the platform's rule.
 LONGEST = 64
 
