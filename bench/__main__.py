@@ -6,7 +6,14 @@ import argparse
 import sys
 from pathlib import Path
 
-from . import finish_command, heavy_command, match_command, mirrors_command, place_command
+from . import (
+    finish_command,
+    heavy_command,
+    match_command,
+    mirrors_command,
+    place_command,
+    web_command,
+)
 
 
 def _demo(options: argparse.Namespace) -> None:
@@ -295,6 +302,7 @@ def main() -> int:
     mirrors_command.add(commands)
     heavy_command.add(commands)
     place_command.add(commands)
+    web_command.add(commands)
     finish_command.add(commands)
 
     c = commands.add_parser("noise", help="where to take out the noise of a capture")

@@ -19,6 +19,7 @@ from ...core.field.head import HEADER
 from ...core.preview import own_light
 from ...core.units import size
 from ...core.web import file, view
+from ...core.web.budget import bare, bytes_for, within
 from ...core.web.errors_of import Errors, errors, mirrors_of
 from ...core.web.reader import Dials, Reader
 from ...core.web.reduce import reduced
@@ -113,7 +114,7 @@ def make(
             else:
                 yield Progress(0.32 + 0.5 * step, "the field as few numbers")
         assert shot is not None
-        shot = _with_lamps(scene, field, shot)
+        shot = within(_with_lamps(scene, field, shot), bytes_for(*field.shape))
     yield Progress(0.85, "how far it is from the plates")
     reader, found = Reader(shot), dict[str, Errors]()
     seen, mirror = field.layer("alpha") > OPAQUE, mirrors_of(shot)
@@ -239,5 +240,4 @@ def _write(
             to = folder / (name if name == SHOT else f"look_{name}")
             with files.whole(to) as partial:
                 shutil.copyfile(scratch / name, partial)
-    bare = len(file.to_bytes(replace(shot, worlds=())))
-    return Made(folder / INDEX, folder / single, bare, len(data), len(shot.numbers), found)
+    return Made(folder / INDEX, folder / single, bare(shot), len(data), len(shot.numbers), found)

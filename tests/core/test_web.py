@@ -16,6 +16,7 @@ from arto.core.region import Region
 from arto.core.relight import relight
 from arto.core.supports import BELL, LINEAR
 from arto.core.web import file, sphere
+from arto.core.web.budget import bare, within
 from arto.core.web.reader import Dials, Reader
 from arto.core.web.reduce import reduced
 from arto.core.web.shot import Shot, map_of, world_of
@@ -86,6 +87,15 @@ def test_it_shows_what_the_field_shows(field: Field, shot: Shot, turn: float) ->
     # strength is a factor for all of it
     brighter = reader.picture(Dials(turn=turn, strength=2.0, behind=False))
     np.testing.assert_allclose(brighter, 2 * found, rtol=1e-5)
+
+
+def test_a_shot_gets_small_enough(shot: Shot) -> None:
+    """By coarser steps, which hardly change the picture."""
+    small = within(shot, bare(shot) - 500)
+    assert bare(small) <= bare(shot) - 500
+    one, two = (Reader(s).picture(Dials()) for s in (shot, small))
+    assert np.abs(one - two).max() < 0.02 * one.max()
+    assert within(shot, bare(shot)) is shot
 
 
 def test_what_a_mirror_shows_is_in_its_lobes(shot: Shot) -> None:
