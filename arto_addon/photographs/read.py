@@ -102,7 +102,8 @@ def _captured(
         yield from _say(photos, found)
         return found
     photos.check_light()
-    yield from _told(monitor_set.write(scratch, photos.said, photos.light, **about))
+    alpha = dome_set.alpha_of(photos)
+    yield from _told(monitor_set.write(scratch, photos.said, photos.light, alpha=alpha, **about))
     if photos.assumed:
         yield Warned(READ, photos.assumed)
     return None
@@ -155,8 +156,8 @@ def _held_out(photos: Photographs, found: Written, folder: Path) -> Steps[None]:
     worst = max(told.rows, key=lambda row: row.error)
     yield Progress(
         0.99,
-        f"a lamp is predicted from the others to {told.error:.0%} on average, the worst, "
-        f"'{files[worst.lamp]}', to {worst.error:.0%}: see {TABLE}",
+        f"half of the lamps are predicted from the others to {told.error:.0%} or better, the "
+        f"worst, '{files[worst.lamp]}', to {worst.error:.0%}: see {TABLE}",
     )
 
 

@@ -27,6 +27,8 @@ DARK, BRIGHT = 0.4, 0.1
 FEWEST, BETTER = 6, 0.8
 # How a lamp's direction and the middle of its light go together, where an axis is turned round.
 TURNED = -0.7
+# The most of the picture's rim that is of a thing that stands alone.
+ALONE = 0.02
 # Pixels that have to tell, and how bright they are in some lamp's light.
 PIXELS, SEEN = 100, 0.1
 
@@ -96,7 +98,7 @@ def why_light(values: NDArray, directions: NDArray, strengths: NDArray) -> str:
 def turned(pictures: NDArray, directions: NDArray, weight: NDArray) -> str:
     """Say whether directions look as if an axis of theirs were turned round.
 
-    What stands out from its ground is brighter on the side of the lamp.
+    A thing that stands alone is brighter on the side of the lamp. Without a mask nothing is said.
 
     Parameters
     ----------
@@ -112,6 +114,9 @@ def turned(pictures: NDArray, directions: NDArray, weight: NDArray) -> str:
     str
         Empty where they look right, or too few lamps tell.
     """
+    rim = np.concatenate([weight[0], weight[-1], weight[:, 0], weight[:, -1]])
+    if float(rim.mean()) > ALONE:  # a ground is brighter below, where lamps are above
+        return ""
     grey = np.nan_to_num(pictures.sum(axis=-1)) * weight
     total = grey.sum(axis=(1, 2))
     lit = total > 0.1 * max(float(total.max(initial=0)), 1e-30)

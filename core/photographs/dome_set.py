@@ -178,6 +178,21 @@ def write(
     return Written(found, hole, saturated / (height * width), level, hemicube.reach)
 
 
+def alpha_of(photos: Photographs) -> NDArray[np.float32]:
+    """Say how much of each pixel is the thing: by the mask, or where the empty set differs.
+
+    Parameters
+    ----------
+    photos : Photographs
+
+    Returns
+    -------
+    (H, W) float32
+        1 everywhere where neither is there.
+    """
+    return _Taking(photos).alpha(0, photos.shape[0])
+
+
 def small_pictures(
     photos: Photographs, most: int = SMALL
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -280,9 +295,9 @@ class _Taking:
             values = picture.rows(first, last).max(axis=-1)
             top = 1.0 if picture.levels else max(float(values.max()), 1.0)
             return np.clip(values / top, 0, 1)
-        if not self.empty:
-            return np.ones((last - first, self.shape[1]), np.float32)
         with_thing = self.ambient or self.photos.group(Kind.LIGHT, lamp=0)
+        if not (self.empty and with_thing):
+            return np.ones((last - first, self.shape[1]), np.float32)
         one = self.photos.measured(with_thing, first, last)[0]
         other = self.photos.measured(self.empty, first, last)[0]
         most = np.maximum(np.maximum(one, other).max(axis=-1), 1e-4)

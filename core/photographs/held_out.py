@@ -74,8 +74,8 @@ class HeldOut:
 
     @property
     def error(self) -> float:
-        """The mean error over all lamps."""
-        return float(np.mean([row.error for row in self.rows]))
+        """The median error over all lamps."""
+        return float(np.median([row.error for row in self.rows]))
 
     def table(self, names: Mapping[int, str] | None = None) -> str:
         """Write the rows as lines of text, the worst first.

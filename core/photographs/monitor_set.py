@@ -276,6 +276,7 @@ def write(
     said: Description,
     taken: Taken,
     clean: bool = True,
+    alpha: NDArray | None = None,
     **about: Any,
 ) -> Iterator[float]:
     """Write photographs of monitors as a capture set of one tile, a file for each patch.
@@ -287,6 +288,8 @@ def write(
     taken : callable
     clean : bool
         Whether noise is taken out, where something was photographed twice.
+    alpha : (H, W) float, optional
+        How much of each pixel is the thing; by default all.
     **about : object
         What else `capture.json` says, by its names there.
 
@@ -317,6 +320,9 @@ def write(
         kept = np.where(np.isfinite(kept), kept, np.float32(0))
         shape = kept.shape[1:3]
         combined = np.ones((*shape, 4), np.float32)
+        if alpha is not None:
+            combined[..., 3] = alpha
+            kept = kept * combined[..., 3:]
         combined[..., :3] = kept.sum(axis=0, dtype=np.float64)
         layers = {COMBINED: combined}
         for image, name in zip(kept, patterns.patterns, strict=True):

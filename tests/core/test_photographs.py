@@ -210,6 +210,7 @@ def test_directions_that_are_upside_down_are_told() -> None:
     directions = around(12, 0.4)
     pictures = np.stack([lambert(d) for d in directions])
     assert agree.turned(pictures, directions, INSIDE) == ""
+    assert agree.turned(pictures, directions * (1, -1, 1), np.ones(INSIDE.shape)) == ""
     assert "turned round in y" in agree.turned(pictures, directions * (1, -1, 1), INSIDE)
     assert "turned round in x" in agree.turned(pictures, directions * (-1, 1, 1), INSIDE)
 
