@@ -11,6 +11,7 @@ from . import (
     heavy_command,
     match_command,
     mirrors_command,
+    photographs_command,
     place_command,
     web_command,
 )
@@ -304,6 +305,7 @@ def main() -> int:
     place_command.add(commands)
     web_command.add(commands)
     finish_command.add(commands)
+    photographs_command.add(commands)
 
     c = commands.add_parser("noise", help="where to take out the noise of a capture")
     c.add_argument("--json", type=Path, default=Path("out/noise.json"))

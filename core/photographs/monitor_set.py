@@ -200,8 +200,19 @@ def measured_noise(said: Description, taken: Taken) -> Noise | None:
         return None
     pairs = [[taken(found[*key[:5], take]) for key in again] for take in (0, 1)]
     before = noises.measured(*map(np.concatenate, pairs))
-    after = [np.concatenate([noises.without_noise(p[None], before)[0] for p in x]) for x in pairs]
+    after = [
+        np.concatenate([noises.without_noise(_whole(p)[None], before)[0] for p in x]) for x in pairs
+    ]
     return Noise(before, noises.measured(*after))
+
+
+def _whole(light: NDArray) -> NDArray:
+    """The light of a photograph. What is saturated is as bright as the brightest that is not."""
+    unknown = ~np.isfinite(light)
+    if not unknown.any():
+        return light
+    known = light[~unknown]
+    return np.where(unknown, known.max() if known.size else 0.0, light)
 
 
 def check(said: Description, hemicube: Hemicube, patterns: PatternSet) -> None:
@@ -262,12 +273,12 @@ def basis_images(
     screens = screens_of(measured.monitors, said.view)
     side = screens[screen_of(hemicube, k, screens)].side
     black = [group for key, group in dark.items() if key[2] in (side, None)]
-    base = np.mean([taken(group) for group in black], axis=0) if black else 0.0
+    base = np.mean([_whole(taken(group)) for group in black], axis=0) if black else 0.0
     unit = level(measured.monitors, hemicube, said.view) * measured.white
     out = []
     for p in range(len(patterns)):
         takes = [group for key, group in found.items() if key[:2] == (k, p)]
-        out.append((np.mean([taken(group) for group in takes], axis=0) - base) / unit)
+        out.append((np.mean([_whole(taken(group)) for group in takes], axis=0) - base) / unit)
     return np.stack(out)
 
 
@@ -317,7 +328,6 @@ def write(
         images = basis_images(said, k, hemicube, patterns, measured, taken)
         filtered = noises.without_noise(images, noise.taken) if clean and noise else None
         kept = np.maximum(images, 0).astype(np.float32) if filtered is None else filtered
-        kept = np.where(np.isfinite(kept), kept, np.float32(0))
         shape = kept.shape[1:3]
         combined = np.ones((*shape, 4), np.float32)
         if alpha is not None:

@@ -36,6 +36,8 @@ from .shift import Shift, edges, middle, put_back, shift_of
 SAME = 1.02
 # Groups of exposures that tell the curve, pixels of each, and rows read of a large picture.
 GROUPS, PIXELS, ROWS = 8, 100, 512
+# So many greys tell the curve by themselves.
+GREYS = 6
 # Pixels of a picture that are looked at whole.
 SMALL = 1 << 22
 
@@ -163,7 +165,12 @@ class Photographs:
                 "photographed with two exposures"
             )
             return curves.srgb()
-        return self._found(several)
+        # greys of a monitor are even pictures of all brightnesses: they tell it best
+        greys = [g for g in several if g[0].kind is Kind.STEP]
+        if len(greys) >= GREYS:
+            return self._found(greys)
+        some = np.unique(np.linspace(0, len(several) - 1, GROUPS).round().astype(int))
+        return self._found([several[i] for i in some])
 
     def _agreeing(self, lit: Sequence[Photograph]) -> str:
         """Why values are taken for light, in words; "" where sRGB's curve agrees as well."""
@@ -184,9 +191,8 @@ class Photographs:
         """The curve that groups of exposures tell."""
         exposures = sorted({t for g in several for t in _times(g)})
         # exposures of all groups in one table: a group lacks those that it was not taken with
-        step = max(1, len(several) // GROUPS)
         rows, levels = [], 255
-        for group in several[::step][:GROUPS]:
+        for group in several:
             values = np.full((PIXELS, len(exposures), 3), -1.0, np.float32)
             there = {p.file: self._sample(p) for p in group}
             levels = max(levels, *(self._pictures[p.file].levels for p in group))
