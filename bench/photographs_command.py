@@ -17,6 +17,7 @@ def add(commands: Any) -> None:
     c.add_argument("--samples", type=int, default=1024, help="of the light without a camera")
     c.add_argument("--many", type=int, default=512, help="samples of a reference")
     c.add_argument("--plan", action="store_true", help="change one thing at a time, for planning")
+    c.add_argument("--only", type=int, nargs="+", help="numbers of the captures, from 0")
     c.add_argument("--sheet", type=Path, help="a PNG of the captures, to write")
     c.set_defaults(run=_run)
 
@@ -25,6 +26,7 @@ def _run(options: argparse.Namespace) -> None:
     from .photographs import HDRIS, photographs, shown_cases, sweep, table
 
     size = (options.width, options.width * 3 // 4)
+    cases = sweep() if options.plan else shown_cases()
     rows = photographs(
         options.json,
         options.scenes,
@@ -32,7 +34,7 @@ def _run(options: argparse.Namespace) -> None:
         size,
         options.samples,
         options.many,
-        sweep() if options.plan else shown_cases(),
+        [cases[i] for i in options.only] if options.only else cases,
         options.sheet,
     )
     print(table(rows))

@@ -37,7 +37,7 @@ SAME = 1.02
 # Groups of exposures that tell the curve, pixels of each, and rows read of a large picture.
 GROUPS, PIXELS, ROWS = 8, 100, 512
 # So many greys tell the curve by themselves.
-GREYS = 6
+GREYS, OF_GREY = 6, 80
 # Pixels of a picture that are looked at whole.
 SMALL = 1 << 22
 
@@ -197,7 +197,12 @@ class Photographs:
             there = {p.file: self._sample(p) for p in group}
             levels = max(levels, *(self._pictures[p.file].levels for p in group))
             order = sorted(group, key=_time)
-            at = _places(there[order[len(order) // 2].file])
+            middle_one = there[order[len(order) // 2].file]
+            if group[0].kind is Kind.STEP:
+                # all pixels are of one light
+                at = np.linspace(0, middle_one[..., 0].size - 1, OF_GREY).astype(np.intp)
+            else:
+                at = _places(middle_one)
             for photo in group:
                 column = int(np.argmin(np.abs(np.log(np.array(exposures) / _time(photo)))))
                 values[: len(at), column] = there[photo.file].reshape(-1, 3)[at]

@@ -32,8 +32,8 @@ from .description import Description, Kind, Monitors, Photograph
 from .screen_curve import assumed_curve, value_of
 from .screens import Screen, hemicube_of, screen_of, screens_of
 
-# The greys of a calibration.
-STEPS = tuple(step / 16 for step in range(17))
+# The greys of a calibration. They tell the curve of the camera too, which needs many of them.
+STEPS = tuple(step / 64 for step in range(65))
 # Degrees at which white is photographed, to find how it falls off.
 ANGLES = (0, 20, 40, 60)
 BLACK = "black"

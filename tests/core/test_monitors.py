@@ -15,6 +15,9 @@ from arto.core.fit.fit import fit
 from arto.core.patterns import monomials, pattern_set
 from arto.core.photographs import monitor_set, noise, shown, simulate
 from arto.core.photographs.description import Description, Kind, Monitors, Photograph
+from arto.core.photographs.opened import Photographs
+from arto.core.photographs.photographer import MonitorRig
+from arto.core.photographs.reader import InMemory
 from arto.core.photographs.screen_curve import (
     assumed_curve,
     falls_of,
@@ -218,3 +221,19 @@ def test_an_evidence_of_noise_counts_less_where_it_is_darker() -> None:
     known = evidence(sizes, (1, 3), np.ones(1), noise=(1e-4, 0.0))
     hits = known.hits(0, np.arange(3))
     assert hits == pytest.approx(sizes[0] ** 2 / 12e-4, rel=1e-5)
+
+
+def test_greys_of_a_monitor_tell_the_curve_of_the_camera_too() -> None:
+    """Within 2%, of exposures three stops apart, and so the light of white and black."""
+    rig = MonitorRig(Monitors(("top",), 1, "white", 64, 64))
+    light = np.geomspace(1e-3, 1, 20)[None, :, None] * np.ones((12, 1, 3))
+    files: dict[str, np.ndarray] = {}
+    said = rig.photograph(lambda k: np.stack([light] * 6), files.__setitem__)
+    photos = Photographs(Path(), said, lambda path: InMemory(files[path.as_posix()] / 255))
+    values = np.arange(20, 245)
+    z = values / 255
+    true = np.where(z <= 0.04045, z / 12.92, ((z + 0.055) / 1.055) ** 2.4)
+    assert np.abs(photos.curve.table[:, values] / true - 1).max() < 0.02
+    found = monitor_set.calibrated(photos.said, photos.light)
+    assert found.white == pytest.approx(np.full(3, 0.998), rel=0.01)
+    assert found.black == pytest.approx(rig.screen.black, rel=0.05)
