@@ -91,7 +91,8 @@ class HoledWorld:
     def environment(self) -> Environment:
         path = Path(bpy.utils.system_resource("DATAFILES")) / "studiolights" / "world"
         found = Environment.load(path / f"{self.name}.exr")
-        azimuth, latitude, _ = sample_directions(*found.image.shape[:2], 1)
+        height, width = found.image.shape[:2]
+        azimuth, latitude, _ = sample_directions(height, width, 1)
         there = self.hemicube.locate(directions(azimuth, latitude))[0] >= 0
         return Environment(np.where(there[..., None], found.image, np.float32(0)))
 
@@ -172,7 +173,7 @@ class _Kept:
     def rows(self, first: int, last: int) -> NDArray[np.float32]:
         kept = self.kept
         values = np.asarray(Image.open(io.BytesIO(kept))) if isinstance(kept, bytes) else kept
-        return values[first:last] / np.float32(np.iinfo(values.dtype).max)
+        return np.asarray(values[first:last], np.float32) / np.float32(np.iinfo(values.dtype).max)
 
 
 def photographed(
