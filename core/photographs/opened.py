@@ -34,10 +34,9 @@ from .shift import Shift, edges, middle, put_back, shift_of
 
 # Exposures nearer than this ratio are one.
 SAME = 1.02
-# Groups of exposures that tell the curve, pixels of each, and rows read of a large picture.
-GROUPS, PIXELS, ROWS = 8, 100, 512
-# So many greys tell the curve by themselves.
-GREYS, OF_GREY = 6, 80
+# Groups of exposures that tell the curve, pixels of each, and rows read of a large picture; how many
+# greys of a monitor tell it by themselves.
+GROUPS, PIXELS, ROWS, GREYS = 8, 100, 512, 6
 # Pixels of a picture that are looked at whole.
 SMALL = 1 << 22
 
@@ -167,10 +166,8 @@ class Photographs:
             return curves.srgb()
         # greys of a monitor are even pictures of all brightnesses: they tell it best
         greys = [g for g in several if g[0].kind is Kind.STEP]
-        if len(greys) >= GREYS:
-            return self._found(greys)
         some = np.unique(np.linspace(0, len(several) - 1, GROUPS).round().astype(int))
-        return self._found([several[i] for i in some])
+        return self._found(greys if len(greys) >= GREYS else [several[i] for i in some])
 
     def _agreeing(self, lit: Sequence[Photograph]) -> str:
         """Why values are taken for light, in words; "" where sRGB's curve agrees as well."""
@@ -196,13 +193,8 @@ class Photographs:
             values = np.full((PIXELS, len(exposures), 3), -1.0, np.float32)
             there = {p.file: self._sample(p) for p in group}
             levels = max(levels, *(self._pictures[p.file].levels for p in group))
-            order = sorted(group, key=_time)
-            middle_one = there[order[len(order) // 2].file]
-            if group[0].kind is Kind.STEP:
-                # all pixels are of one light
-                at = np.linspace(0, middle_one[..., 0].size - 1, OF_GREY).astype(np.intp)
-            else:
-                at = _places(middle_one)
+            one = sorted(group, key=_time)[len(group) // 2]
+            at = _places(there[one.file], one.kind is Kind.STEP)
             for photo in group:
                 column = int(np.argmin(np.abs(np.log(np.array(exposures) / _time(photo)))))
                 values[: len(at), column] = there[photo.file].reshape(-1, 3)[at]
@@ -391,8 +383,10 @@ def _shows(values: NDArray) -> float:
     return float(((grey > 0.05) & (grey < 0.95)).mean())
 
 
-def _places(values: NDArray) -> NDArray[np.intp]:
+def _places(values: NDArray, one_light: bool = False) -> NDArray[np.intp]:
     """Pixels of a photograph that are as their neighbours, spread over all values it has."""
+    if one_light:
+        return np.linspace(0, values[..., 0].size - 1, PIXELS).astype(np.intp)
     grey = values.mean(axis=-1)
     rough = np.zeros(grey.shape)
     for axis in (0, 1):
