@@ -34,8 +34,7 @@ from .shift import Shift, edges, middle, put_back, shift_of
 
 # Exposures nearer than this ratio are one.
 SAME = 1.02
-# Groups of exposures that tell the curve, pixels of each, and rows read of a large picture; how many
-# greys of a monitor tell it by themselves.
+# Groups of exposures that tell the curve, pixels of each, rows of a large picture; enough greys.
 GROUPS, PIXELS, ROWS, GREYS = 8, 100, 512, 6
 # Pixels of a picture that are looked at whole.
 SMALL = 1 << 22
