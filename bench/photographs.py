@@ -7,6 +7,7 @@ The truth is Cycles' render under an HDRI that is black where the capture has no
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
@@ -46,7 +47,7 @@ def case_rows(
 ) -> list[dict[str, Any]]:
     """The rows of one case: of each world, all pixels and each material."""
     light, alpha = rendered(scene_name, case, size, samples)
-    folder = OUT / "work"
+    folder = OUT / f"work_{os.getpid()}"
     fields = {}
     for name in ("faults", "none"):
         shutil.rmtree(folder / name, ignore_errors=True)
