@@ -1,6 +1,8 @@
 """`python -m core.photographs`: what a laboratory does without Blender (paper 4.2).
 
 `patterns` writes the pictures that monitors show, and the list of the photographs to take.
+`calibrate` writes the curve and the fall-off of the monitor, by photographs of its greys, into the
+description of a folder.
 
 Examples
 --------
@@ -15,12 +17,17 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
-from ..errors import ArtoError
+from ..errors import ArtoError, PhotographsError
 from ..faces import FACE_NAMES
 from . import description_file
-from .description import Description, Monitors
+from .description import Description, Kind, Monitors
+from .monitor_set import calibrated
+from .opened import Photographs
+from .reader import by_openimageio
 from .screens import hemicube_of, hole
 from .shown import write
 
@@ -132,6 +139,8 @@ def parser() -> argparse.ArgumentParser:
         help="a photographs.json with the monitors: their corners, their measured curve, and how "
         "they fall off",
     )
+    one = verbs.add_parser("calibrate", help="measure the monitor by photographs of its greys")
+    one.add_argument("folder", type=Path, help="has photographs.json and the photographs of greys")
     return out
 
 
@@ -149,7 +158,7 @@ def main(arguments: Sequence[str]) -> int:
     """
     options = parser().parse_args(arguments)
     try:
-        print(_patterns(options))
+        print({"patterns": _patterns, "calibrate": _calibrate}[options.verb](options))
     except ArtoError as e:
         print(f"ARTO: {e}", file=sys.stderr)
         return 1
@@ -171,6 +180,28 @@ def _patterns(options: argparse.Namespace) -> str:
         f"{shown} pictures to show in {options.folder / 'show'}, by {curve}. {count} photographs "
         f"to take are in {options.folder / description_file.FILE}. {len(cube)} patches light "
         f"{1 - hole(cube):.0%} of all directions; from the others no light will come."
+    )
+
+
+def _calibrate(options: argparse.Namespace) -> str:
+    try:
+        library = import_module("OpenImageIO")
+    except ImportError as e:
+        raise PhotographsError(
+            "photographs are read by OpenImageIO: pip install openimageio"
+        ) from e
+    path = options.folder / description_file.FILE
+    said = description_file.read(path)
+    greys = tuple(p for p in said.of(Kind.STEP) if (options.folder / p.file).is_file())
+    if not greys:
+        raise PhotographsError(f"{options.folder} has no photographs of greys: see {path}")
+    some = Photographs(options.folder, replace(said, photographs=greys), by_openimageio(library))
+    measured = calibrated(some.said, some.light)
+    description_file.write(options.folder, replace(said, monitors=measured.monitors))
+    return (
+        f"{path} has the monitor's curve now, by {len(greys)} photographs: black is "
+        f"{measured.black:.2%} of white, and light falls off as the cosine to the power of "
+        f"{measured.monitors.falls:.2f}. Write the patterns again: patterns FOLDER --like {path}"
     )
 
 

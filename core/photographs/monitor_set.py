@@ -274,7 +274,7 @@ def basis_images(
     side = screens[screen_of(hemicube, k, screens)].side
     black = [group for key, group in dark.items() if key[2] in (side, None)]
     base = np.mean([_whole(taken(group)) for group in black], axis=0) if black else 0.0
-    unit = level(measured.monitors, hemicube, said.view) * measured.white
+    unit = level(said.monitors or measured.monitors, hemicube, said.view) * measured.white
     out = []
     for p in range(len(patterns)):
         takes = [group for key, group in found.items() if key[:2] == (k, p)]
@@ -321,7 +321,9 @@ def write(
     check(said, hemicube, patterns)
     noise = measured_noise(said, taken)
     if noise is not None:
-        unit = level(measured.monitors, hemicube, said.view) * float(measured.white.mean())
+        unit = level(said.monitors or measured.monitors, hemicube, said.view) * float(
+            measured.white.mean()
+        )
         noise = noise.over(unit)
     names, shape = [], (0, 0)
     for k in range(len(hemicube)):

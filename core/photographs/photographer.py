@@ -172,7 +172,7 @@ class MonitorRig:
             put(photo.file, self.camera.values(light, photo.exposure or 1.0, rng))
         return Description(
             tuple(listed),
-            monitors=replace(self.monitors, curve=None, falls=0.0),
+            monitors=replace(self.monitors, curve=None, falls=self.falls),
             width=room.shape[1],
             height=room.shape[0],
             curve=LINEAR if self.camera.curve == LINEAR else None,

@@ -13,7 +13,15 @@ from arto.core.field.field import Field
 from arto.core.fit.evidence import evidence
 from arto.core.fit.fit import fit
 from arto.core.patterns import monomials, pattern_set
-from arto.core.photographs import monitor_set, noise, shown, simulate
+from arto.core.photographs import __main__ as command
+from arto.core.photographs import (
+    description_file,
+    monitor_set,
+    noise,
+    png_file,
+    shown,
+    simulate,
+)
 from arto.core.photographs.description import Description, Kind, Monitors, Photograph
 from arto.core.photographs.opened import Photographs
 from arto.core.photographs.photographer import MonitorRig
@@ -237,3 +245,18 @@ def test_greys_of_a_monitor_tell_the_curve_of_the_camera_too() -> None:
     found = monitor_set.calibrated(photos.said, photos.light)
     assert found.white == pytest.approx(np.full(3, 0.998), rel=0.01)
     assert found.black == pytest.approx(rig.screen.black, rel=0.05)
+
+
+def test_a_folder_of_greys_is_calibrated_by_the_command(tmp_path: Path, capsys) -> None:
+    pytest.importorskip("OpenImageIO")
+    rig = MonitorRig(Monitors(("top",), 1, "white", 64, 64), falls=1.5)
+    files: dict[str, np.ndarray] = {}
+    said = rig.photograph(lambda k: np.full((6, 12, 20, 3), 0.3), files.__setitem__)
+    for name, values in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        png_file.write(tmp_path / name, values)
+    description_file.write(tmp_path, replace(said, monitors=replace(said.monitors, falls=0.0)))
+    assert command.main(["calibrate", str(tmp_path)]) == 0, capsys.readouterr()
+    found = description_file.read(tmp_path / description_file.FILE).monitors
+    assert found is not None and found.falls == pytest.approx(1.5, abs=0.05)
+    assert np.abs(np.array(found.curve) - rig.screen.curve).max() < 0.02
