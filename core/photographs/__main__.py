@@ -18,10 +18,10 @@ import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 
-from ..errors import ArtoError, PhotographsError
+from ..errors import ArtoError, ExrError, PhotographsError
+from ..exr.open_image_io import imported
 from ..faces import FACE_NAMES
 from . import description_file
 from .description import Description, Kind, Monitors
@@ -185,10 +185,10 @@ def _patterns(options: argparse.Namespace) -> str:
 
 def _calibrate(options: argparse.Namespace) -> str:
     try:
-        library = import_module("OpenImageIO")
-    except ImportError as e:
+        library = imported(())
+    except ExrError as e:
         raise PhotographsError(
-            "photographs are read by OpenImageIO: pip install openimageio"
+            "photographs are read by a library that is missing: install ARTO's extra 'photographs'"
         ) from e
     path = options.folder / description_file.FILE
     said = description_file.read(path)
