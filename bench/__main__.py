@@ -300,11 +300,8 @@ def main() -> int:
     c.add_argument("--sheet", type=Path, default=Path("out/accuracy_sheet.png"))
     c.set_defaults(run=_accuracy)
 
-    mirrors_command.add(commands)
-    heavy_command.add(commands)
-    place_command.add(commands)
-    web_command.add(commands)
-    finish_command.add(commands)
+    for one in (mirrors_command, heavy_command, place_command, web_command, finish_command):
+        one.add(commands)
     photographs_command.add(commands)
 
     c = commands.add_parser("noise", help="where to take out the noise of a capture")
