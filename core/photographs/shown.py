@@ -12,7 +12,7 @@ Examples
 >>> picture(screen, cube, 1, "u", monitors)[..., 0].tolist()[-1]  # of the lower right patch
 [0, 0, 0, 0, 99, 163, 206, 240]
 >>> [len(photographs(monitors, cube, exposures=(0.1, 1.0))), level(monitors, cube)]
-[68, 1.0]
+[164, 1.0]
 """
 
 from __future__ import annotations
