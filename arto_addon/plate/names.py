@@ -20,7 +20,8 @@ _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr"}
 _PLAIN = "relit"  # The ending of a plate's name where there is no look.
 # Endings of the names of files beside a plate. Numbers are those of frames.
 _BESIDE = re.compile(
-    r"(^|_)(catcher|light|layers|data|comp|composite|world|full|verify|samples|finished|match|\d{4,})$",
+    r"(^|_)(catcher|light|layers|data|comp|composite|world|full|verify|samples|finished|sequence"
+    r"|match|\d{4,})$",
     re.IGNORECASE,
 )
 _HASHES = re.compile(r"([._-]?)(#+)(?=[^#]*$)")

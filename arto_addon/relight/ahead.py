@@ -46,13 +46,15 @@ class Wanted:
     """A picture that is to be made.
 
     path: of its EXR; frame: None for the scene's present one; file: an environment map in the
-    place of the scene's world, or None; turn: of a turntable, as a share of the whole circle.
+    place of the scene's world, or None; turn: of a turntable, as a share of the whole circle;
+    frames: of a sequence whose first picture this is, first and last.
     """
 
     path: Path
     frame: int | None = None
     file: Path | None = None
     turn: float = 0.0
+    frames: tuple[int, int] | None = None
 
 
 def wanted(

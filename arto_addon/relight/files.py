@@ -99,11 +99,14 @@ def _written(
             found[layers.BEHIND] = picture[..., :3] - made.things
         attributes, space = plate.header_of(scene, about)
         yield from layers.write(scene, path, picture, found, attributes, space, opener)
-        if settings.scripts and path == relit_file(scene):
+        frames, one = ready.lit.frames, path == relit_file(scene)
+        if settings.scripts and (one or frames):
             files = layers.files_by_name(scene, path, found)
-            yield from scripts.write(
-                path, scripts.described(scene, path, files, bool(caught)), opener
-            )
+            mix = scripts.described(scene, path, files, bool(caught))
+            if one:
+                yield from scripts.write(path, mix, opener)
+            if frames:
+                yield from scripts.write(*scripts.of_frames(scene, path, mix, frames[1]), opener)
 
 
 def _into_footage(

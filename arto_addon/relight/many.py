@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -58,6 +59,10 @@ def relight_many(
     named = {one.path.name: error for one, error in wrong.items()}
     yield from looked(named, len(pictures), "pictures", batch)
     left = [one for one in pictures if one not in wrong]
+    whole = not wrong and not worlds and turns == 1 and len(frames) > 1
+    # a sequence of every second frame is none that other programs can be told of
+    ends = (frames[0], frames[-1]) if whole and frames[-1] - frames[0] == len(frames) - 1 else None
+    left[:1] = [replace(one, frames=ends) for one in left[:1]]
     done = yield from _made(scene, view_layer, left, batch)
     if not done:
         raise SceneError("none of the pictures could be made: see what was said of each")
@@ -128,7 +133,7 @@ def _prepared(lent: ExitStack, shown: Shown, one: Wanted) -> Steps[Ready]:
     scene = shown.scene
     world = _lent(lent, scene, shown.layer, one.file, one.turn)
     look = one.file.stem if one.file else scene.arto.look
-    return (yield from make_ready(shown, Light(one.path, look, world)))
+    return (yield from make_ready(shown, Light(one.path, look, world, one.frames)))
 
 
 def _lent(

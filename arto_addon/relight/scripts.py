@@ -6,6 +6,7 @@ files anyway, because it reads them by their names.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +15,7 @@ import bpy
 
 from ...core.exr.writing import Opener
 from ...core.mix.fusion import fusion_comp
-from ...core.mix.mix import Behind, Layer, Mix
+from ...core.mix.mix import Behind, Layer, Mix, sequence
 from ...core.mix.nuke import nuke_script
 from ..blender.colour import working_space
 from ..blender.compositing import compositor
@@ -61,6 +62,26 @@ def described(
         frame=scene.frame_current,
     )
     return as_mixed(mix, mixer_of(scene, mix))
+
+
+def of_frames(scene: bpy.types.Scene, path: Path, mix: Mix, last: int) -> tuple[Path, Mix]:
+    """The mix of a sequence from that of its first frame -> (where its scripts stand, the mix).
+
+    The scripts are named after the sequence, without their endings. Footage that moves is left out.
+    """
+    number = _number_in(path.stem, mix.frame)
+    begin, _, end = path.stem.rpartition(number)
+    found = sequence(mix, last, path.stem, f"{begin}{'#' * len(number)}{end}")
+    source = footage(scene)
+    if found.behind is not None and source is not None and source.source.source != "FILE":
+        found = replace(found, behind=replace(found.behind, footage=None))
+    return path.with_name(f"{begin}sequence{end}.exr"), found
+
+
+def _number_in(stem: str, frame: int) -> str:
+    """How a frame's number stands in the name of its plate: last, with as many digits as there."""
+    found = re.findall(r"-?\d+", stem)
+    return next(digits for digits in reversed(found) if int(digits) == frame)
 
 
 def mixer_of(scene: bpy.types.Scene, mix: Mix) -> bpy.types.Node | None:

@@ -55,12 +55,13 @@ class Light:
     """A light to show a shot in.
 
     path: of the picture to write; look: the light's name in the picture's header; world: None for
-    the view layer's own world.
+    the view layer's own world; frames: of a sequence whose first picture this is, first and last.
     """
 
     path: Path
     look: str = ""
     world: bpy.types.World | None = None
+    frames: tuple[int, int] | None = None
 
 
 def check_film(scene: bpy.types.Scene, field: Field) -> None:

@@ -17,12 +17,14 @@ Blackmagic Design, Fusion scripting guide: tools and inputs by name; composition
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 
 from .mix import Behind, Mix, words
 from .nuke import node_name
 from .stamp import stamped
 
+_HASHES = re.compile("#+")
 # What Fusion itself writes for a channel that is to be empty.
 _EMPTY = "SomethingThatWontMatchHopefully"
 _ADDED = {"Red": "r1 + r2", "Green": "g1 + g2", "Blue": "b1 + b2", "Alpha": "a1"}
@@ -80,11 +82,12 @@ class _Comp:
             self._into(mix.behind)
         tools = "\n".join(self._tools)
         said = "\n".join(words(mix))
+        last = mix.frame if mix.last is None else mix.last
         return (
             "Composition {\n"
             f"\tCurrentTime = {mix.frame},\n"
-            f"\tRenderRange = {{ {mix.frame}, {mix.frame} }},\n"
-            f"\tGlobalRange = {{ {mix.frame}, {mix.frame} }},\n"
+            f"\tRenderRange = {{ {mix.frame}, {last} }},\n"
+            f"\tGlobalRange = {{ {mix.frame}, {last} }},\n"
             f"\tComments = {_text(said)},\n"
             f"\tTools = {{\n{tools}\n\t}},\n"
             f"\tPrefs = {{ Comp = {{ FrameFormat = {{ Width = {mix.size[0]}, "
@@ -121,11 +124,17 @@ class _Comp:
     ) -> None:
         beside = "/" not in file and "\\" not in file
         path = f"Comp:/{file}" if beside else file
-        frame = self._mix.frame
+        frame, last, length, start = self._mix.frame, self._mix.frame, "", -1
+        if self._mix.last is not None and "#" in file:
+            # Fusion finds a sequence by the file of its first frame
+            last, start = self._mix.last, frame
+            length = f"Length = {last - frame + 1}, "
+            path = _HASHES.sub(lambda mark: f"{frame:0{len(mark[0])}d}", path)
         clip = (
-            f'ID = "Clip1", Filename = {_text(path)}, FormatID = "OpenEXRFormat", '
-            "StartFrame = -1, LengthSetManually = true, TrimIn = 0, TrimOut = 0, ExtendFirst = 0, "
-            f"ExtendLast = 0, Loop = 1, GlobalStart = {frame}, GlobalEnd = {frame},"
+            f'ID = "Clip1", Filename = {_text(path)}, FormatID = "OpenEXRFormat", {length}'
+            f"StartFrame = {start}, LengthSetManually = true, TrimIn = 0, "
+            f"TrimOut = {last - frame}, ExtendFirst = 0, ExtendLast = 0, Loop = 1, "
+            f"GlobalStart = {frame}, GlobalEnd = {last},"
         )
         if not path.lower().endswith(".exr"):
             clip = clip.replace('FormatID = "OpenEXRFormat", ', "")

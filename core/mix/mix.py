@@ -15,7 +15,7 @@ Examples
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -95,7 +95,10 @@ class Mix:
     fps : float
         Frames a second.
     frame : int
-        The frame of the plate.
+        The frame of the plate, or the first one of a sequence.
+    last : int, optional
+        The last frame of a sequence. The names of its files then have a `#` for each digit of the
+        frame's number.
     """
 
     plate: str
@@ -109,6 +112,46 @@ class Mix:
     aspect: float = 1.0
     fps: float = 24.0
     frame: int = 1
+    last: int | None = None
+
+
+def sequence(mix: Mix, last: int, stem: str, pattern: str) -> Mix:
+    """Make the mix of a frame that of a sequence.
+
+    Parameters
+    ----------
+    mix : Mix
+        Of the first frame.
+    last : int
+        The last frame. There is a plate of every frame between.
+    stem : str
+        What the names of the first frame's files begin with.
+    pattern : str
+        The same for all frames, with a `#` for each digit of the number.
+
+    Returns
+    -------
+    Mix
+        Footage has its own numbers: a moving one is left out.
+
+    Examples
+    --------
+    >>> one = Mix("a_0007.exr", (4, 2), (Layer("key"),), together="a_0007_layers.exr", frame=7)
+    >>> many = sequence(one, 9, "a_0007", "a_####")
+    >>> many.plate, many.together, many.frame, many.last
+    ('a_####.exr', 'a_####_layers.exr', 7, 9)
+    """
+
+    def named(file: str | None) -> str | None:
+        return pattern + file.removeprefix(stem) if file and file.startswith(stem) else file
+
+    layers = tuple(replace(layer, file=named(layer.file)) for layer in mix.layers)
+    behind = mix.behind and replace(mix.behind, file=named(mix.behind.file) or "")
+    plate = named(mix.plate) or mix.plate
+    together, data = named(mix.together), named(mix.data)
+    return replace(
+        mix, plate=plate, layers=layers, together=together, behind=behind, data=data, last=last
+    )
 
 
 def mixed(mix: Mix, layers: Mapping[str, NDArray]) -> NDArray[np.float64]:
@@ -174,4 +217,6 @@ def words(mix: Mix) -> list[str]:
             else ("light + (1 - the things' alpha) * footage + light of the ground")
         )
         said.append(f"Into footage: {by}. Footage must be linear, in the same space.")
+        if mix.behind.footage is None:
+            said.append("Put your footage in the place of the black 'Footage'.")
     return said

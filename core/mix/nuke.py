@@ -55,7 +55,8 @@ class _Script:
         mix = self._mix
         self._lines += [f"# {line}" for line in words(mix)]
         self._lines += ["version 12.0 v1", "Root {", " inputs 0"]
-        self._lines += [f" first_frame {mix.frame}", f" last_frame {mix.frame}"]
+        last = mix.frame if mix.last is None else mix.last
+        self._lines += [f" first_frame {mix.frame}", f" last_frame {last}"]
         self._lines += [f" frame {mix.frame}", f" format {self._format}", f" fps {mix.fps:g}"]
         self._lines += [" colorManagement Nuke", "}"]
         for layer in mix.layers:
@@ -130,6 +131,10 @@ class _Script:
         beside = "/" not in file and "\\" not in file
         path = f"{_HERE}/{_path(file)}" if beside else _path(file.replace("\\", "/"))
         knobs = [("file", f'"{path}"')]
+        if self._mix.last is not None and "#" in file:
+            ends = {"first": self._mix.frame, "last": self._mix.last}
+            knobs += [(f"{of}{name}", str(n)) for of in ("", "orig") for name, n in ends.items()]
+            knobs.append(("origset", "true"))
         if raw:
             knobs += [("format", self._format), ("raw", "true")]
         self._node("Read", name, (), place, knobs)

@@ -13,7 +13,7 @@ import pytest
 from arto.arto_addon import work
 from arto.arto_addon.blender.compositing import compositor
 from arto.arto_addon.plate import plate
-from arto.arto_addon.relight import relight, scripts
+from arto.arto_addon.relight import many, relight, scripts
 from arto.core import exr
 from arto.core.files import whole
 from arto.core.mix.mix import Layer, Mix
@@ -75,6 +75,37 @@ def test_a_script_that_was_changed_stays(lit):
     lit.arto.layers = "OFF"
     work.run(relight.relight(lit))
     assert changed.read_bytes() == before and not other.exists()
+
+
+def test_a_script_of_a_sequence_makes_every_plate_of_it(lit):
+    """The files that a compositor finds at a frame add up to the plate of that frame."""
+    background = next(n for n in lit.world.node_tree.nodes if n.type == "BACKGROUND")
+    strength = background.inputs["Strength"]
+    for frame, value in ((1, 1.0), (3, 0.25)):
+        strength.default_value = value
+        strength.keyframe_insert("default_value", frame=frame)
+    done = work.run(many.relight_many(lit, lit.view_layers[0].name, frames=range(1, 4)))
+    assert [path.stem[-4:] for path in done] == ["0001", "0002", "0003"]
+    base = done[0].with_name(done[0].name.replace("0001", "sequence"))
+    texts = {ending: base.with_suffix(ending).read_text("utf-8") for ending in RUNS}
+    assert "first_frame 1\n last_frame 3" in texts[".nk"]
+    assert "origfirst 1\n origlast 3" in texts[".nk"]
+    assert "TrimOut = 2" in texts[".comp"] and "GlobalEnd = 3" in texts[".comp"]
+    means = []
+    for path in done:
+        number = path.stem[-4:]
+        beauty = exr.read(path)[""][..., :3]
+        means.append(beauty.mean())
+        # Nuke reads by hashes, Fusion by the name of the first frame
+        for ending, named in ((".nk", "####"), (".comp", "0001")):
+            files = {
+                name.replace(number, named): channels
+                for name, channels in files_in(path.parent).items()
+                if number in name
+            }
+            found = mix_tools.rgb(RUNS[ending](texts[ending], files, str(path.parent))["Mix"])
+            np.testing.assert_allclose(found, beauty, atol=1e-5 * beauty.max())
+    assert means[0] > 1.2 * means[2]
 
 
 @pytest.mark.parametrize("shadows", ["MULTIPLY", "ADD"])
