@@ -21,6 +21,8 @@ from ..relight.looks import relight_looks
 from ..relight.many import frames_of, relight_many
 from ..relight.relight import compute
 from ..relight.verify import verify_plate
+from ..sheet.make import make as make_sheet
+from ..sheet.make import sheet_of
 from ..shoot import shoot
 from ..stage.settings import samples_of
 from ..web.make import folder_of, make
@@ -42,6 +44,7 @@ Verb = Literal[
     "even_out",
     "photographs",
     "web",
+    "sheet",
 ]
 
 
@@ -82,6 +85,10 @@ def _web(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
     return (yield from make(scene, view_layer, folder_of(scene))).single
 
 
+def _sheet(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
+    return make_sheet(scene, view_layer, sheet_of(scene))
+
+
 def _capture(scene: bpy.types.Scene, view_layer: str) -> Steps[Path]:
     return capture(scene, view_layer, shows=True)
 
@@ -109,5 +116,6 @@ VERBS: Mapping[Verb, Work] = {
     "match": Work(match_target, "looking for the light of"),
     "photographs": Work(read_and_relight, "reading the photographs of", captures=True),
     "web": Work(_web, "making the page of"),
+    "sheet": Work(_sheet, "making the sheet of"),
     "even_out": Work(even_out, "looking for even light on"),
 }

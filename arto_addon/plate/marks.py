@@ -13,12 +13,15 @@ from ...core import exr
 from ...core.errors import ArtoError, SceneError
 from ...core.file_names import is_text, same_file
 from ...core.mix.stamp import is_own
+from ...core.photographs import png_file
 from ...core.regular import read_regular
 
 # The attribute in the header of each file of a plate that names the plate's own file.
 PLATE = "arto.plate"
 # Attributes that files of earlier versions have, which do not name their plate.
 _OF_EARLIER = ("arto.light key", "arto.verify")
+# The text in a PNG file that lists what a contact sheet shows.
+SHEET = "arto.sheet"
 # What the names of files beside a plate end with.
 ENDINGS = ("catcher", "light", "layers", "data", "comp", "verify", "samples", "finished")
 # What the names of scripts for compositors beside a plate end with; no script is as long as that.
@@ -29,6 +32,8 @@ def is_of(path: Path, plate: Path) -> bool:
     """Whether ARTO has written a file beside a plate, by what the file's header says."""
     if path.suffix in SCRIPTS:
         return path.stem == plate.stem and is_own_script(path)
+    if path.suffix.lower() == ".png":
+        return is_sheet(path)
     head = _header(path)
     if PLATE in head:
         return str(head[PLATE]) == plate.name
@@ -42,6 +47,8 @@ def is_marked(path: Path) -> bool:
     """Whether ARTO has written a picture or a script, of whatever plate."""
     if path.suffix in SCRIPTS:
         return is_own_script(path)
+    if path.suffix.lower() == ".png":
+        return is_sheet(path)
     head = _header(path)
     return PLATE in head or any(name in head for name in _OF_EARLIER)
 
@@ -51,6 +58,14 @@ def is_own_script(path: Path) -> bool:
     try:
         return is_own(read_regular(path, _LONG).decode("utf-8"))
     except (OSError, ValueError):
+        return False
+
+
+def is_sheet(path: Path) -> bool:
+    """Whether a PNG file is a contact sheet that ARTO has written."""
+    try:
+        return SHEET in png_file.texts(path)
+    except OSError:
         return False
 
 

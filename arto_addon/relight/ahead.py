@@ -47,7 +47,8 @@ class Wanted:
 
     path: of its EXR; frame: None for the scene's present one; file: an environment map in the
     place of the scene's world, or None; turn: of a turntable, as a share of the whole circle;
-    frames: of a sequence whose first picture this is, first and last.
+    frames: of a sequence whose first picture this is, first and last;
+    look, world: a look's name and its world, None for the scene's own.
     """
 
     path: Path
@@ -55,15 +56,21 @@ class Wanted:
     file: Path | None = None
     turn: float = 0.0
     frames: tuple[int, int] | None = None
+    look: str | None = None
+    world: bpy.types.World | None = None
 
 
 def wanted(
-    scene: bpy.types.Scene, worlds: Sequence[Path], turns: int, frames: Sequence[int]
+    scene: bpy.types.Scene,
+    worlds: Sequence[Path],
+    turns: int,
+    frames: Sequence[int],
+    camera: str = "",
 ) -> list[Wanted]:
     """List the pictures of some worlds, of a turntable or of frames, in the order of the work.
 
-    Each is named after its map and numbered by turn or frame. Raises SceneError where the pictures
-    have no place to go.
+    Each is named after its camera and its map, and numbered by turn or frame. camera: another one
+    than the scene's. Raises SceneError where the pictures have no place to go.
     """
     out = []
     for frame in frames or [None]:
@@ -73,14 +80,31 @@ def wanted(
                 number = frame if frame is not None else turn + 1 if turns > 1 else None
                 if frame is not None and numbers_frames(scene):
                     number = None  # it is in the name already
-                path = _named(base, file, number)
+                path = _named(base, file, number, camera)
                 out.append(Wanted(path, frame, file, turn / turns))
     return out
 
 
-def _named(base: Path, file: Path | None, number: int | None) -> Path:
+def wanted_looks(scene: bpy.types.Scene, frames: Sequence[int], camera: str = "") -> list[Wanted]:
+    """List the pictures of the scene's looks, at its present frame or at frames, as `wanted` does.
+
+    A look's picture at a frame is the one that a relight of that frame makes while the look is
+    shown. Raises SceneError where the pictures have no place to go.
+    """
+    out = []
+    for frame in frames or [None]:
+        number = None if numbers_frames(scene) else frame
+        for look in scene.arto.looks:
+            if look.world:
+                path = _named(relit_file(scene, look.name, frame), None, number, camera)
+                out.append(Wanted(path, frame, look=look.name, world=look.world))
+    return out
+
+
+def _named(base: Path, file: Path | None, number: int | None, camera: str = "") -> Path:
     """The path of one of many pictures, as in `shot_sunset_0001.exr`."""
-    parts = [base.stem, *([of_look(file.stem)] if file else [])]
+    parts = [base.stem, *([of_look(camera)] if camera else [])]
+    parts += [of_look(file.stem)] if file else []
     parts += [f"{number:04d}"] if number is not None else []
     return base.with_name("_".join(parts) + ".exr")
 
@@ -113,12 +137,15 @@ def look(
                         raise missing[frame]
                 still = shown_at(scene, view_layer, still)
                 _check_mattes(still, rendered)
-                check_frame(still, own_world=any(p.file is None for p in some), strict=strict)
+                own = any(p.file is None and p.world is None for p in some)
+                check_frame(still, own, strict)
             except ArtoError as e:
                 wrong |= dict.fromkeys(some, e)
                 continue
             for one in some:
                 try:
+                    if one.world:
+                        check_images(one.world, scene.frame_current)
                     check_picture(still, one.path, read)
                     needed[one.path] = bytes_of(still)
                 except ArtoError as e:

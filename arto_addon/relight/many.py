@@ -63,17 +63,17 @@ def relight_many(
     # a sequence of every second frame is none that other programs can be told of
     ends = (frames[0], frames[-1]) if whole and frames[-1] - frames[0] == len(frames) - 1 else None
     left[:1] = [replace(one, frames=ends) for one in left[:1]]
-    done = yield from _made(scene, view_layer, left, batch)
+    done = yield from made(scene, view_layer, left, batch)
     if not done:
         raise SceneError("none of the pictures could be made: see what was said of each")
     yield Progress(1.0, f"wrote {len(done)} pictures, the last one {done[-1]}")
     return done
 
 
-def _made(
+def made(
     scene: bpy.types.Scene, view_layer: str, pictures: Sequence[Wanted], batch: Batch
 ) -> Steps[list[Path]]:
-    """Make pictures, those of a frame together -> the paths of those that were made."""
+    """Make pictures that were looked at, those of a frame together -> the paths of those made."""
     done: list[Path] = []
     begun, total, still = 0, len(pictures), None
     with frame_kept(scene):
@@ -131,22 +131,19 @@ def _group(
 def _prepared(lent: ExitStack, shown: Shown, one: Wanted) -> Steps[Ready]:
     """Make the light of a picture ready -> `Ready`. lent: removes the picture's world again."""
     scene = shown.scene
-    world = _lent(lent, scene, shown.layer, one.file, one.turn)
-    look = one.file.stem if one.file else scene.arto.look
+    world = lit_by(lent, scene, shown.layer, one)
+    look = one.file.stem if one.file else scene.arto.look if one.look is None else one.look
     return (yield from make_ready(shown, Light(one.path, look, world, one.frames)))
 
 
-def _lent(
-    lent: ExitStack, scene: bpy.types.Scene, view_layer: str, file: Path | None, turn: float
+def lit_by(
+    lent: ExitStack, scene: bpy.types.Scene, view_layer: str, one: Wanted
 ) -> bpy.types.World | None:
-    """The world of a picture, which `lent` removes again; None for the scene's own world.
-
-    turn: as a share of the whole circle.
-    """
-    world = lent.enter_context(world_showing(file)) if file else None
-    if turn:
+    """The world of a picture; None for the scene's own. lent: removes what is made for it again."""
+    world = lent.enter_context(world_showing(one.file)) if one.file else one.world
+    if one.turn:
         world = world or check_world(scene, view_layer)
-        world = lent.enter_context(turned(scene, view_layer, world, turn * math.tau))
+        world = lent.enter_context(turned(scene, view_layer, world, one.turn * math.tau))
     return world
 
 

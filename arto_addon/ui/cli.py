@@ -37,7 +37,7 @@ from ..resident import serve as resident
 from ..shot import home, paths, scene_id
 from ..shot.adopting import adopt, adopt_from
 from ..work import Batch, ProgressLines, Steps, run, strictly
-from . import cli_photograph, cli_photographs, cli_web
+from . import cli_photograph, cli_photographs, cli_sheet, cli_web
 from .cli_light import give, light
 from .inventory import FORMAT, Inventory, inventory
 from .options import EVERY_FRAME, parser
@@ -119,6 +119,11 @@ def _do(verb: str, options: dict[str, Any], report: Report) -> None:
         page = cli_web.work_of(scene, layer, options)
         _set(scene, options)
         run(_as_asked(page, batch, False), report)
+        return
+    if verb == "sheet":
+        sheet = cli_sheet.work_of(scene, layer, options, batch)
+        _set(scene, options)
+        run(_as_asked(sheet, batch, True), report)
         return
     if verb == "photograph":
         photos = cli_photograph.work_of(scene, layer, options)

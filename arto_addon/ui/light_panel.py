@@ -181,4 +181,6 @@ def _looks(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
     buttons = row.column(align=True)
     buttons.operator("arto.add_look", text="", icon="ADD")
     buttons.operator("arto.remove_look", text="", icon="REMOVE")
-    column.operator("arto.relight_looks", icon="RENDERLAYERS")
+    row = column.row(align=True)
+    row.operator("arto.relight_looks", icon="RENDERLAYERS")
+    row.operator("arto.sheet", icon="IMGDISPLAY")

@@ -11,7 +11,7 @@ from ...core.file_names import is_text
 from ..blender.devices import KINDS
 from ..settings import table
 from ..settings.setting import Setting
-from . import cli_photograph, cli_photographs, cli_web
+from . import cli_photograph, cli_photographs, cli_sheet, cli_web
 
 # What stands for all frames that a capture was begun of.
 EVERY_FRAME = range(0)
@@ -114,6 +114,10 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--look", type=_text, help="the look that the plate is of")
     web = jobs.add_parser("web", parents=[files, told], help="make a page that relights the shot")
     cli_web.add(web, _path)
+    sheet = jobs.add_parser("sheet", parents=[files, told], help="put plates onto one sheet")
+    cli_sheet.add(sheet, _path, _text, frames)
+    for setting in table.options("relight"):
+        _add_option(sheet, setting)
     _add_light(jobs.add_parser("light", parents=[files], help="read or write the light kit"))
     _add_adopt(jobs.add_parser("adopt", parents=[files], help="use another file's captures"))
     _add_status(jobs.add_parser("status", parents=[files], help="say what there is of a shot"))

@@ -28,6 +28,7 @@ WORKS: tuple[Verb, ...] = (
     "relight",
     "relight_frames",
     "relight_looks",
+    "sheet",
     "verify",
     "finish",
     "composite",

@@ -17,6 +17,9 @@ from ..capture.check import check_scene
 from ..capture.more import can_have_more, more_samples
 from ..relight import looks
 from ..relight.looks import show_looks
+from ..sheet.make import check as check_sheet
+from ..sheet.make import make as make_sheet
+from ..sheet.make import sheet_of
 from ..shoot import shoot_and_show
 from ..shot import paths, status
 from ..shot.shot import layer_of
@@ -194,6 +197,13 @@ class ARTO_OT_remove_look(Quick):
         return f"removed the look '{looks.remove(context.scene)}'"
 
 
+def _can_relight_looks(cls: type, context: bpy.types.Context) -> bool:
+    if not context.scene.arto.looks:
+        cls.poll_message_set("There are no looks yet: add one")
+        return False
+    return free(cls) and can_relight(cls, context)
+
+
 class ARTO_OT_relight_looks(LongWork):
     """Relight the shot in each of its looks: a plate for each"""
 
@@ -203,13 +213,29 @@ class ARTO_OT_relight_looks(LongWork):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not context.scene.arto.looks:
-            cls.poll_message_set("There are no looks yet: add one")
-            return False
-        return free(cls) and can_relight(cls, context)
+        return _can_relight_looks(cls, context)
 
     def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps[object]:
         return show_looks(scene, view_layer)
+
+
+class ARTO_OT_sheet(LongWork):
+    """Put the plates of all looks onto one picture with their names, beside the plate. Plates \
+that are missing or out of date are made first"""
+
+    bl_idname = "arto.sheet"
+    bl_label = "Sheet"
+    verb = "sheet"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _can_relight_looks(cls, context)
+
+    def check(self, scene: bpy.types.Scene) -> None:
+        check_sheet(scene, sheet_of(scene))
+
+    def steps(self, scene: bpy.types.Scene, view_layer: str) -> Steps[object]:
+        return make_sheet(scene, view_layer, sheet_of(scene))
 
 
 class ARTO_OT_open_guide(Quick):
@@ -235,5 +261,6 @@ CLASSES = (
     ARTO_OT_add_look,
     ARTO_OT_remove_look,
     ARTO_OT_relight_looks,
+    ARTO_OT_sheet,
     ARTO_OT_open_guide,
 )

@@ -63,6 +63,7 @@ Near | Nah | 近さ
 White Balance | Weißabgleich | ホワイトバランス
 Save Composite | Composite speichern | 合成を保存
 Web Page | Webseite | Webページ
+Sheet | Bogen | 一覧
 Open Page | Seite öffnen | ページを開く
 Open HDRI | HDRI öffnen | HDRIを開く
 Use This HDRI | Dieses HDRI verwenden | このHDRIを使う

@@ -127,6 +127,18 @@ def show_verified(job: SecondBlender) -> str:
     return job.state.text
 
 
+def show_sheet(job: SecondBlender) -> str:
+    """Show the contact sheet."""
+    path = Path(job.state.result)
+    if _scene_of(job) is not None and path.is_file():
+        window = bpy.context.window_manager.windows[0]
+        with bpy.context.temp_override(window=window):
+            image = bpy.data.images.load(str(path), check_existing=True)
+            image.reload()
+            reveal(image)
+    return job.state.text
+
+
 def show_finished(job: SecondBlender) -> str:
     """Show the picture that plate and samples make together."""
     scene = _scene_of(job)
@@ -176,6 +188,7 @@ _FINISHERS: dict[Verb, Callable[[SecondBlender], str]] = {
     "relight": show_relit,
     "relight_frames": show_relit,
     "relight_looks": show_looks,
+    "sheet": show_sheet,
     "capture": show_captured,
     "shoot": show_captured,
     "more_samples": show_captured,

@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 import pytest
 from arto.arto_addon import work
+from arto.arto_addon.blender.display import image_of, saving
 from arto.arto_addon.shot.shot import layer_of
 from arto.arto_addon.web.display import table_of
 from arto.arto_addon.web.make import Made, make
@@ -62,8 +63,6 @@ def test_the_camera_looks_where_its_rays_go(shot: bpy.types.Scene) -> None:
 @pytest.mark.parametrize("transform", ["AgX", "Standard"])
 def test_the_table_shows_what_blender_shows(shot: bpy.types.Scene, transform: str) -> None:
     """Colours that are not on the grid, beside what Blender saves of them."""
-    from arto.arto_addon.web.display import _image, _saving
-
     before = shot.view_settings.view_transform
     shot.view_settings.view_transform = transform
     try:
@@ -71,7 +70,7 @@ def test_the_table_shows_what_blender_shows(shot: bpy.types.Scene, transform: st
         rng = np.random.default_rng(1)
         light = (2.0 ** rng.uniform(-8, 4, (16, 16, 3))).astype(np.float32)
         path = Path(bpy.app.tempdir) / "shown.png"
-        with _saving(shot, "PNG", "8") as on, _image(light, float_buffer=True) as image:
+        with saving(shot, "PNG", "8") as on, image_of(light, float_buffer=True) as image:
             image.save_render(str(path), scene=on)
         saved = bpy.data.images.load(str(path))
         saved.colorspace_settings.name = "Non-Color"

@@ -100,7 +100,7 @@ FLOW = {
     < capture < light < kit < supports < field < fit < lights < relight < catcher < preview
     < inside < place < match < verify < finish < photographs < web""",
     "arto_addon": """interrupt < work < settings < blender < stage < shot < kit < world < plate
-    < fit < capture < photographer < relight < match < web < shoot < photographs < job
+    < fit < capture < photographer < relight < match < sheet < web < shoot < photographs < job
     < resident < live < farm < ui""",
 }
 

@@ -1,0 +1,1 @@
+"""A contact sheet: plates by their lights, cameras and frames in one picture, for approvals."""
