@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -10,20 +9,18 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core import checksum, exr, signed
-from ...core.errors import ArtoError, SceneError
-from ...core.file_names import folded
+from ...core import exr
+from ...core.errors import SceneError
 from ...core.files import whole
-from ...core.values import Values
 from ..blender.compositing import OUTPUT, composited, compositor, own_compositor
 from ..blender.pictures import put
-from ..shot import paths
 from ..work import Progress, Steps
 from .names import relit_file
+from .notes import note, noted
 
 COMPOSITE = "ARTO Composite"
-# In ARTO's folder: what was written, and the attribute of the key in the header of a plate.
-NOTES, KEY = "composites.json", "arto.light key"
+# The attribute of the key in the header of a plate.
+KEY = "arto.light key"
 
 
 def composite_file(scene: bpy.types.Scene) -> Path:
@@ -83,28 +80,14 @@ def said_of(scene: bpy.types.Scene) -> Mapping[str, object]:
     `plate` is the key of the plate that it was made of. Other formats than EXR have no room for
     such notes, so they are in a file in ARTO's folder.
     """
-    path = composite_file(scene)
-    noted = _notes(scene).get(folded(path), {})
-    with contextlib.suppress(OSError):
-        if isinstance(noted, dict) and noted.get("sum") == checksum.of_file(path):
-            return noted
-    return {}
-
-
-def _notes(scene: bpy.types.Scene) -> dict[str, object]:
-    path = paths.worlds_folder(scene).with_name(NOTES)
-    with contextlib.suppress(ArtoError):
-        if path.is_file():
-            return Values(path, SceneError).kind("files", dict, {})
-    return {}
+    return noted(scene, composite_file(scene))
 
 
 def _note(scene: bpy.types.Scene, path: Path) -> None:
     """Note what was written, and of which plate. Raises OSError."""
     plate = relit_file(scene)
     key = exr.header(plate).get(KEY, "") if plate.is_file() else ""
-    noted = _notes(scene) | {folded(path): {"sum": checksum.of_file(path), "plate": str(key)}}
-    signed.write(paths.worlds_folder(scene).with_name(NOTES), {"files": noted})
+    note(scene, path, str(key))
 
 
 def _composited(scene: bpy.types.Scene) -> NDArray[np.float32]:

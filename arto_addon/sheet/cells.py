@@ -103,8 +103,8 @@ def to_make(scene: bpy.types.Scene, view_layer: str, some: Sequence[Wanted]) -> 
     return out
 
 
-def cell_of(scene: bpy.types.Scene, view_layer: str, one: Wanted, width: int) -> Cell:
-    """Read a plate, and show it as the scene shows renders. width: the most that a cell may have.
+def cell_of(scene: bpy.types.Scene, view_layer: str, one: Wanted, width: int | None = None) -> Cell:
+    """Read a plate, and show it as the scene shows renders. width: the most that it may have.
 
     A plate over footage is shown in it. Raises ExrError where a file is missing or damaged.
     """
@@ -115,7 +115,9 @@ def cell_of(scene: bpy.types.Scene, view_layer: str, one: Wanted, width: int) ->
         filmed = footage(scene) is not None and plate.comp_file(one.path).is_file()
         camera, frame = camera_of(scene), scene.frame_current
     source = plate.comp_file(one.path) if filmed else one.path
-    light = smaller(framed(source), width)
+    light = framed(source)
+    if width is not None:
+        light = smaller(light, width)
     alpha = np.clip(light[..., 3:4], 0, 1) if light.shape[-1] > 3 else np.ones_like(light[..., :1])
     # Blender shows the colour that the pixel's part has, over what is behind
     part = np.where(alpha > 1e-4, alpha, 1)

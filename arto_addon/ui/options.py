@@ -115,7 +115,7 @@ def parser() -> argparse.ArgumentParser:
     web = jobs.add_parser("web", parents=[files, told], help="make a page that relights the shot")
     cli_web.add(web, _path)
     sheet = jobs.add_parser("sheet", parents=[files, told], help="put plates onto one sheet")
-    cli_sheet.add(sheet, _path, _text, frames)
+    cli_sheet.add(sheet, _path, _text, frames, _from_one)
     for setting in table.options("relight"):
         _add_option(sheet, setting)
     _add_light(jobs.add_parser("light", parents=[files], help="read or write the light kit"))

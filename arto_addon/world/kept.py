@@ -24,7 +24,7 @@ from ..blender.nodes import shader_tree, trees
 from ..kit import base as of_base
 from ..kit import kit as kits
 from ..shot import paths
-from ..shot.fingerprint import of_blocks
+from ..shot.fingerprint import Fingerprint, of_blocks
 from ..shot.pixels import image as digest_of
 from ..shot.shot import layer_of
 from .bake import bake
@@ -132,12 +132,16 @@ def _key(scene: bpy.types.Scene, world: bpy.types.World, width: int) -> str:
     of.append(of_textures(scene))
     # `full` reads the files: an HDRI may be replaced by a file of the same size and time.
     found = of_blocks([world], full=True)
-    # The world's name does not count, as a copy of the world has another name.
-    of.append(sorted(("World" if k.startswith("World") else k, v) for k, v in found.items()))
+    of.append(_unnamed(found))
     of.append(stamps(world, scene.frame_current))
     if moves(world):
         of.append((scene.frame_current, scene.frame_subframe))
     return hashlib.sha256(repr(of).encode()).hexdigest()[:16]
+
+
+def _unnamed(found: Fingerprint) -> list[tuple[str, str]]:
+    """What a world is made of, without its own name: a copy of a world has another one."""
+    return sorted(("World" if k.startswith("World") else k, v) for k, v in found.items())
 
 
 def _of_kit(scene: bpy.types.Scene, world: bpy.types.World) -> tuple[str, float, float] | None:
@@ -173,7 +177,7 @@ def shows(
     if not full and (quick := _of_kit(scene, world)):
         return quick
     strength, turn, dials = read(world)
-    of: list[object] = [*sorted(of_blocks([world], full=full, without=dials).items())]
+    of: list[object] = [*_unnamed(of_blocks([world], full=full, without=dials))]
     of += [of_textures(scene), *context(scene, layer_of(scene), world)]
     if moves(world):
         of += [stamps(world, scene.frame_current), scene.frame_current, scene.frame_subframe]

@@ -13,7 +13,7 @@ from arto.arto_addon import work
 from arto.arto_addon.blender.display import displayed
 from arto.arto_addon.capture.capture import capture
 from arto.arto_addon.plate.marks import SHEET
-from arto.arto_addon.relight import looks
+from arto.arto_addon.relight import ahead, looks
 from arto.arto_addon.sheet.cells import framed
 from arto.arto_addon.sheet.layout import AROUND, WIDEST, layout, smaller
 from arto.arto_addon.sheet.make import make, sheet_of
@@ -142,6 +142,31 @@ def test_a_sheet_is_not_written_over_files_of_others(two: bpy.types.Scene, tmp_p
         work.run(make(two, layer, tmp_path / "sheet.jpg"))
     with pytest.raises(SceneError, match="no camera 'Other'"):
         work.run(make(two, layer, tmp_path / "sheet.png", cameras=["Other"]))
+
+
+def test_a_movie_turns_the_world(two: bpy.types.Scene, tmp_path: Path) -> None:
+    """Its pictures are those of a turntable, and a movie of others is not written over."""
+    path = tmp_path / "turn.mp4"
+    asked = ["sheet", str(path), "--turntable", "3"]
+    scenes = len(bpy.data.scenes)
+    assert cli.main(asked) == 0
+    plates = [one.path for one in ahead.wanted(two, (), 3, ())]
+    light = [next(iter(exr.read(plate).values()))[..., :3] for plate in plates]
+    assert not np.allclose(light[0], light[1], rtol=0.02)
+    clip = bpy.data.movieclips.load(str(path))
+    assert (*clip.size, clip.frame_duration) == (WIDTH, HEIGHT, 3)
+    bpy.data.movieclips.remove(clip)
+    # a movie keeps brightness about at each pixel, and colour at every second
+    error = read(path) - displayed(two, light[0])
+    assert np.abs(error.mean((0, 1))).max() < 0.01
+    assert np.abs(error @ [0.2126, 0.7152, 0.0722]).mean() < 0.025
+    before = [plate.stat().st_mtime_ns for plate in plates]
+    assert cli.main(asked) == 0
+    assert [plate.stat().st_mtime_ns for plate in plates] == before
+    assert len(bpy.data.scenes) == scenes
+    path.write_bytes(b"a movie of someone else's")
+    assert cli.main(asked) == 1 and path.read_bytes() == b"a movie of someone else's"
+    assert cli.main(["sheet", str(path)]) == cli.main([*asked, "--frames", "1-2"]) == 2
 
 
 def test_a_cropped_plate_stands_in_its_frame(tmp_path: Path) -> None:
