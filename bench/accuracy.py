@@ -205,7 +205,9 @@ def world_rows(
     edges = shadow_edges(truth, shot.guides, seen)
     groups = {m: seen & (one.index == i) for m, i in scenes.MATERIALS[shot.name].items()}
     split = lamps.split(environment)
-    lamp_samples = relight.lamp_samples(shot.scene(), split.share) if split.worth else 0
+    lamp_samples = 0
+    if split.worth:
+        lamp_samples = relight.lamp_samples(shot.scene(), split.share, shot.samples)
     found = [(n, shot.samples, p) for n, p in shot.pictures(world, environment).items()]
     for samples in SAMPLES:
         raw, clean = rerendered(shot.name, world, shot.size, samples)

@@ -103,14 +103,18 @@ def one(name: str, hdri: str = "sunset") -> dict[str, Any]:
         if max(relit.mean(), truth.mean()) < 1e-5:  # nothing gets in, and nothing is seen
             for figure in ("error", "noise_floor", "denoised_render", "bias", "bias_of_noise"):
                 row[figure] = 0.0
-        if abs(row["bias"]) > BIAS + row["bias_of_noise"]:
+        most = max(row["denoised_render"], row["noise_floor"]) + BEHIND
+        biased, left = abs(row["bias"]) > BIAS + row["bias_of_noise"], row["error"]
+        if biased or left > most:
             # a few samples have not found all the light yet, and a denoiser takes what stands out
             scene.arto.samples, scene.arto.denoise = FINE * SAMPLES, False
             relit, _ = _relit(scene, folder)
             row["bias"] = float(relit.mean() / truth.mean() - 1)
             row["text"] = f"bias: of {FINE * SAMPLES} samples, not denoised"
-    good = row["error"] <= max(row["denoised_render"], row["noise_floor"]) + BEHIND
-    if not (good and abs(row["bias"]) < BIAS + row["bias_of_noise"]):
+            if left > most:
+                left = metrics.mean_relative_error(relit, truth)
+                row |= {"status": "noise", "text": f"error {left:.3f}, {row['text']}"}
+    if left > most or abs(row["bias"]) >= BIAS + row["bias_of_noise"]:
         row["status"] = "wrong"
     if head.caution:
         row |= {"status": f"{row['status']}, said", "text": head.caution.text}
@@ -163,8 +167,9 @@ def page(rows: list[dict[str, Any]]) -> str:
             f"is the noise floor. Beside it, Cycles' denoised render of {SAMPLES} samples. Errors",
             "are mean relative errors, bias is the ratio of the means less one. Right is what is",
             f"within {BEHIND} of the denoised render with a bias of at most {BIAS:.0%}, beside",
-            "twice what the two seeds differ by; where a bias is larger it is looked at again with",
-            f"{FINE} times as many samples and no denoiser, which tells noise from a fault. Paths",
+            "twice what the two seeds differ by; where error or bias is larger it is looked at",
+            f"again with {FINE} times as many samples and no denoiser, which tells noise from a",
+            "fault. An error that this takes away is noise, and the row says what is left. Paths",
             "have an umlaut, a percent sign, braces and a hash in them. (`python -m bench field",
             "--json FILE --page docs/scenes.md`.)",
             "",

@@ -80,7 +80,7 @@ class Suns:
     ) -> None:
         """Take the snapshot that the suns are rendered in. Raises SceneError."""
         self._resident = resident
-        self._field = opened.field.folder
+        self._field, self._captured = opened.field.folder, opened.field.about.samples
         self.why = why_not(opened)
         whole = not opened.draft and len(opened.preview.takes) == 1
         self.can_clean = whole and denoise.known() is not False
@@ -141,7 +141,7 @@ class Suns:
         key, full, image: the map; factor: how many times smaller than the field the picture may
         be; share: of the suns in all light. Raises SceneError.
         """
-        most = min(MOST_SAMPLES, lamp_samples(scene, share))
+        most = min(MOST_SAMPLES, lamp_samples(scene, share, self._captured))
         question = self._question(key, full, turn, factor, most, MOVING, scene.arto.denoise)
         self._send(question, image, None, lambda found: setattr(self, "picture", found))
 
@@ -165,7 +165,7 @@ class Suns:
         height, width = picture.shape[:2]
         seconds = RESTING + RESTING_EACH * height * width / 1e6
         rendered = share > 0 and whole.wish.suns is not None
-        samples = lamp_samples(scene, share)
+        samples = lamp_samples(scene, share, self._captured)
         question = self._question(key, True, turn, 1, samples, seconds, True)
         question |= {"resting": True, "suns": rendered, "strength": whole.wish.strength}
         question["picture"] = str(self._resident.folder / FIELD)

@@ -166,7 +166,8 @@ def of_plate(shot: Shown, ready: Ready) -> Steps[dict[str, NDArray[np.float32]]]
             light = lamps
             if len(some) > 1:
                 mine = part_of(ready.found.lamps, parts[name])
-                samples = lamp_samples(scene, share * ready.found.share)
+                captured, of_all = field.about.samples, share * ready.found.share
+                samples = lamp_samples(scene, of_all, captured)
                 light = yield from lamp_light(scene, field, mine, samples, 0.9)
             found[name] = found[name] + light
     own = field.layer("own")

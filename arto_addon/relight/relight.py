@@ -44,6 +44,10 @@ OPAQUE = 1 - 1e-5
 # If the lamps have more than this share of the light, every pixel behind the plate looks for them.
 # If light below 0 has more than this share, the artist is told.
 LEAST_SHARE = 1e-3
+# Half of the sphere lies behind a surface, so light that fills half of it loses no samples. Where
+# the light has less than the part NARROW of the capture's samples, and fewer than ENOUGH, the
+# artist is told.
+BEHIND_A_SURFACE, NARROW, ENOUGH = 0.5, 0.2, 64
 
 
 def relight(
@@ -124,8 +128,27 @@ def make_ready(shown: Shown, lit: Light) -> Steps[Ready]:
     yield Progress(0.5, "bringing the environment to the patches")
     light = PatchLight(found.rest if parts else whole, field.hemicube)
     laps.lap("light")
+    if said := narrow(field, light, found.share if parts else 0.0):
+        yield Warned(0.55, said)
     return Ready(
         lit, world, whole, found, rendered, lamps, together, light, changed, by_rays, below, laps
+    )
+
+
+def narrow(field: Field, light: PatchLight, rendered: float) -> str:
+    """Say that a light is noisy because few of the capture's samples show it, or "".
+
+    rendered: the share of the world's light that lamps bring, which are rendered by themselves.
+    """
+    captured, left = field.about.samples, 1 - rendered
+    if not captured or field.about.route == Route.PHOTOGRAPHS or left < LEAST_SHARE:
+        return ""
+    part = min(light.spread / BEHIND_A_SURFACE, 1.0) / left**2
+    if not 0 < part < NARROW or part * captured >= ENOUGH:
+        return ""
+    return (
+        f"the world's light comes from few directions: of the capture's {captured:g} samples about "
+        f"{part * captured:.0f} show it. More Samples makes the plate cleaner"
     )
 
 
@@ -261,7 +284,7 @@ def _lamps(shown: Shown, found: Split) -> Steps[tuple[list[NDArray[np.float32]],
         yield Warned(0.3, f"the world's lamps: {lamps}")
         return [], lamps, False
     else:
-        samples = lamp_samples(shown.scene, found.share)
+        samples = lamp_samples(shown.scene, found.share, about.samples)
         lamps = f"{found.share:.0%} of the world's light, {samples} samples"
         yield Progress(0.2, f"the world's lamps: {lamps}")
         begun = time.perf_counter()

@@ -40,10 +40,11 @@ LIGHT = (
         kind="whole",
         title="Sun Samples",
         words="Samples of that render for an HDRI that is all suns and lamps; for one where "
-        "they have a part of the light, that part of the samples",
-        least=1,
+        "they have a part of the light, that part of the samples. 0: a quarter of the capture's "
+        "samples, and at least 32",
+        least=0,
         soft_most=256,
-        default=32,
+        default=0,
         work="relight",
         decides=Decides.PLATE,
         farm=False,

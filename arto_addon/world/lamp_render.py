@@ -112,11 +112,19 @@ def _saved(shown: Environment, file: Path) -> bpy.types.Image:
 
 # The least samples of the lamps: fewer leave edges rough.
 LEAST_SAMPLES = 4
+# Where the artist gives no number, lamps that have all the light get this part of the capture's
+# samples, and no fewer than FEW_SAMPLES. Else a finer capture would not make such a plate cleaner.
+OF_CAPTURE, FEW_SAMPLES = 0.25, 32
 
 
-def lamp_samples(scene: bpy.types.Scene, share: float) -> int:
-    """How many samples lamps get that have this share of the world's light, 0 to 1."""
-    return max(LEAST_SAMPLES, math.ceil(scene.arto.lamp_samples * share))
+def lamp_samples(scene: bpy.types.Scene, share: float, captured: float | None) -> int:
+    """How many samples lamps get that have this share of the world's light, 0 to 1.
+
+    captured: the samples of a pixel of the capture; None where they are not known.
+    """
+    told = scene.arto.lamp_samples
+    whole = told or max(FEW_SAMPLES, OF_CAPTURE * (captured or 0))
+    return max(LEAST_SAMPLES, math.ceil(whole * share))
 
 
 def lamp_light(

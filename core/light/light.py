@@ -181,6 +181,20 @@ class PatchLight:
         total = np.add.reduceat(self._flat, self._offsets[:-1])
         return total[:, :3] / total[:, 3:]
 
+    @property
+    def spread(self) -> float:
+        """How much of the sphere an even light of the same noise would fill, 0 to 1.
+
+        A capture spreads its samples over all patches, and those of dark patches bring nothing. The
+        variance of a sum of patches goes by the mean of the light's squares. So this is the square
+        of the light's mean over the mean of the light's squares; 0 without light.
+        """
+        radiance = np.maximum(self.whole, 0).sum(axis=-1)
+        solid_angles = self.hemicube.solid_angles
+        squares = float(solid_angles @ radiance**2)
+        sphere = 4 * np.pi
+        return float(solid_angles @ radiance) ** 2 / (sphere * squares) if squares > 0 else 0.0
+
     def bin_centres(self, k: int) -> tuple[NDArray, NDArray]:
         """Compute the centres of a patch's bins.
 

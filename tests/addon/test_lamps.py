@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import bpy
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from arto.arto_addon.blender.nodes import new_world
 from arto.arto_addon.fit import fit
 from arto.arto_addon.plate.names import relit_file
 from arto.arto_addon.relight import relight
+from arto.arto_addon.relight.relight import narrow
 from arto.arto_addon.shot import paths
 from arto.arto_addon.stage import small
 from arto.arto_addon.world import lamp_render as lamps
@@ -19,6 +22,7 @@ from arto.core.errors import SceneError
 from arto.core.field.field import Field
 from arto.core.light.environment import Environment
 from arto.core.light.lamps import split
+from arto.core.light.light import PatchLight
 from scene_tools import captured, cycles, differences, small_scene, snapshot
 
 
@@ -197,6 +201,33 @@ def test_the_lamps_are_clamped_as_the_artist_clamps(shot):
         shot.cycles.sample_clamp_direct, shot.cycles.sample_clamp_indirect = 0.0, own
         shot.objects["Sun"].lightgroup = ""
     assert 0.01 < clamped.max() < 0.6
+
+
+def test_a_finer_capture_has_cleaner_lamps(shot):
+    """Lamps with all the light get a quarter of the capture's 256 samples, and a part of that where
+    they have a part of the light. A number that the artist gives counts as it is."""
+    said = relit(shot, lamp_samples=0)[1]
+    share, samples = (float(n) for n in re.findall(r"[0-9]+(?=%| samples)", said))
+    assert samples == pytest.approx(256 / 4 * share / 100, abs=1)
+    shot.arto.lamp_samples = 0
+    found = [lamps.lamp_samples(shot, 1.0, n) for n in (None, 16, 2048)]
+    shot.arto.lamp_samples = 256
+    assert found == [32, 32, 512]
+    assert lamps.lamp_samples(shot, 0.5, 2048) == 128
+
+
+def test_light_from_few_directions_is_said(shot):
+    """One of 24 patches has 2 of the 24 parts of the samples that light from half of the sphere
+    has: 21 of 256. Light from everywhere, or most of it from lamps, is not worth a word."""
+    field = Field(paths.field_folder(shot))
+    hemicube = field.hemicube
+    ones = np.ones(len(hemicube), np.intp)
+    bins = np.repeat(hemicube.solid_angles[:, None], 4, axis=1)
+    assert narrow(field, PatchLight.of_bins(hemicube, ones, bins), 0.0) == ""
+    bins[1:, :3] = 0
+    one = PatchLight.of_bins(hemicube, ones, bins)
+    assert "256 samples about 21 show it" in narrow(field, one, 0.0)
+    assert narrow(field, one, 0.8) == ""
 
 
 def test_a_near_hemicube_keeps_its_lamps(tmp_path):

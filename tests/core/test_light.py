@@ -89,6 +89,20 @@ def test_boxes_average_by_solid_angle(rotation, smooth, texel_directions, seed: 
     assert max(flat) > 5e-3
 
 
+def test_light_of_one_face_fills_a_sixth_of_the_sphere() -> None:
+    """And light of all faces all of it, however many patches there are and however bright it is."""
+    hemicube = Hemicube(patches=4)
+    even = PatchLight(Environment.uniform(3.0), hemicube)
+    assert even.spread == pytest.approx(1, rel=1e-6)
+    one = even.whole.copy()
+    one[len(hemicube) // 6 :] = 0
+    bins = np.column_stack([one * hemicube.solid_angles[:, None], hemicube.solid_angles])
+    lit = PatchLight.of_bins(hemicube, np.ones(len(hemicube), np.intp), bins)
+    assert lit.spread == pytest.approx(1 / 6, rel=1e-6)
+    bins[:, :3] = 0
+    assert PatchLight.of_bins(hemicube, lit.resolutions, bins).spread == 0
+
+
 def test_whole_is_the_box_of_the_whole_patch(noisy) -> None:
     light = PatchLight(noisy(1), Hemicube())
     for k in (0, 50, 95):
