@@ -136,6 +136,13 @@ def test_an_hour_of_an_artist(walk: Walk, tmp_path: Path, program: Program) -> N
     )
     assert red[2] / red[0] < 0.5 * first[2] / first[0]
     walk.shot("looks")
+    # their sheet is shown as it is on disk; their plates are not made again
+    plates = [tmp_path / f"old_Scene_{name}.exr" for name in ("Look", "Red")]
+    before = [plate.stat().st_mtime_ns for plate in plates]
+    w.do("bpy.ops.arto.sheet('INVOKE_DEFAULT')")
+    assert w.idle()[0] == "INFO"
+    w.wait(f"{shown} == ['old_relit_sheet.png']")
+    assert [plate.stat().st_mtime_ns for plate in plates] == before
     w.do("bpy.context.scene.arto.active_look = 0")
 
     # layers, mixed in the compositor
