@@ -9,8 +9,8 @@ Examples
 >>> [round(v) for v in circle]
 [120, 90, 50]
 >>> picture[88:93, 134:139] = 9.0
->>> [round(float(v), 2) for v in direction(picture, circle)]
-[0.61, -0.0, 0.79]
+>>> [abs(round(float(v), 2)) for v in direction(picture, circle)]
+[0.61, 0.0, 0.79]
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ Examples
 >>> said = Description((Photograph("a", Kind.LIGHT, lamp=0),), (Lamp((0.0, 0.0, 1.0)),))
 >>> half = InMemory(np.full((4, 6, 3), 0.5), linear=True)
 >>> there = Photographs(Path("there"), said, lambda path: half)
->>> there.shape, there.light(said.photographs).max(), there.assumed
-((4, 6), np.float32(0.5), '')
+>>> there.shape, float(there.light(said.photographs).max()), there.assumed
+((4, 6), 0.5, '')
 """
 
 from __future__ import annotations

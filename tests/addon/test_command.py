@@ -163,7 +163,7 @@ def test_a_saved_file_has_the_id(shot, monkeypatch, tmp_path):
     def save():
         saved.append((shot.arto.scene_id, shot.arto.samples))
 
-    monkeypatch.setattr(cli, "_save_blend", save)
+    monkeypatch.setattr(cli, "save", save)
     own, samples, folder = shot.arto.scene_id, shot.arto.samples, shot.arto.folder
     shot.arto.scene_id = ""
     try:

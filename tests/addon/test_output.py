@@ -175,4 +175,4 @@ def test_the_header_says_what_blenders_own_does(tmp_path):
     assert found["pixelAspectRatio"] == own["pixelAspectRatio"]
     assert abs(len(found["Date"]) - len(own["Date"])) == 0
     assert found["framesPerSecond"] == Fraction(24000, 1001)
-    assert str(found["timeCode"]).startswith("(0, 0, 0, 7")
+    assert found["timeCode"] == exr.TimeCode(0, 0, 0, 7)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import queue
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from arto.arto_addon.fit import fit
 from arto.arto_addon.job import snapshot
 from arto.arto_addon.resident import making, prepared, serve
 from arto.arto_addon.resident.resident import ANSWER, STOP
+from arto.arto_addon.shot import home
 from arto.arto_addon.world.lamp_render import lamp_light
 from arto.core import arrays
 from arto.core.errors import CancelledError
@@ -50,6 +52,13 @@ def asked(tmp_path_factory: pytest.TempPathFactory) -> prepared.Question:
         full=False, map="", turn=0.0, resting=True, factor=1, samples=64, seconds=60.0, clean=False,
         picture="", suns=True, strength=1.0, out=str(folder / "suns.npy"),
     )  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def _back() -> Iterator[None]:
+    """Forget afterwards that this process worked on a copy of a file."""
+    yield
+    home._home.clear()
 
 
 def test_two_suns_in_a_row_prepare_the_scene_once(asked: prepared.Question) -> None:

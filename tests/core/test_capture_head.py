@@ -301,7 +301,7 @@ def test_a_set_that_blender_did_not_render_says_so_where_it_is_asked(tmp_path: P
 
 def test_the_names_of_kinds_are_those_of_files_and_settings() -> None:
     """They are in .blend files and capture sets on disk: another name is another file."""
-    assert [*Route] == ["all", "pattern", "single", "sampled"]
+    assert [*Route] == ["all", "pattern", "single", "sampled", "photographs"]
     assert [*Keep] == ["always", "fits", "never"]
     assert [*Quality] == ["DRAFT", "GOOD", "FINAL", "CUSTOM"]
     assert [*Take] == ["", "ground", "things"]
