@@ -204,7 +204,8 @@ def test_tiles_are_cut_finer_where_they_take_longer_than_planned(tmp_path, monke
 
 def test_ctrl_c_in_the_module_ends_between_two_steps(capsys) -> None:
     """Python's own answer, an error in the midst of a render, would end the process."""
-    before = signal.getsignal(signal.SIGINT)
+    # a shell that runs this beside other work has Ctrl-C ignored
+    outside = signal.signal(signal.SIGINT, signal.default_int_handler)
     left = []
 
     def steps() -> work.Steps[None]:
@@ -217,8 +218,11 @@ def test_ctrl_c_in_the_module_ends_between_two_steps(capsys) -> None:
         finally:
             left.append("put back")
 
-    with pytest.raises(CancelledError):
-        work.run(steps())
-    assert left == ["goes on after Ctrl-C", "put back"]
-    assert signal.getsignal(signal.SIGINT) is before
+    try:
+        with pytest.raises(CancelledError):
+            work.run(steps())
+        assert left == ["goes on after Ctrl-C", "put back"]
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, outside)
     assert "stopping" in capsys.readouterr().err
