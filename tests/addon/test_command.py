@@ -78,7 +78,8 @@ def test_a_report_is_written_over_no_other_file(shot, tmp_path):
     [
         "relight --turntable 0", "relight --turntable -1", "relight --frames 4-1",
         "relight --frames 1-4:0", "relight --frames 1-2000000", "relight --own-lamps nan",
-        "relight --own-lamps inf", "relight --lamp-samples -1", "relight --lamp-samples 99999999999",
+        "relight --own-lamps inf", "relight --lamp-samples -1",
+        "relight --lamp-samples 99999999999",
         "capture --patches 17", "capture --seed -1", "plan --job x --seeds 0",
         "plan --job x --tiles 0",
     ],
