@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import queue
+import threading
 from pathlib import Path
 
 import bpy
@@ -11,14 +13,23 @@ from numpy.typing import NDArray
 
 from ...core import exr
 from ...core.errors import ArtoError
+from ..shot import watch
 
 WIDTH = 192
 _pictures: list[bpy.utils.previews.ImagePreviewCollection] = []
 _written: dict[str, int] = {}
+# What threads are reading, and what they have read: a plate's path, and its picture or None.
+_reading: set[str] = set()
+_read_ones: queue.SimpleQueue[tuple[str, NDArray[np.float32] | None]] = queue.SimpleQueue()
+# Seconds between two looks at what was read.
+_EVERY = 0.1
 
 
 def of_plate(path: Path) -> int:
-    """The icon of a plate on disk; 0 without a plate or without a window."""
+    """The icon of a plate on disk; 0 without a plate or without a window.
+
+    A thread reads the file. Meanwhile the icon is that of the plate before, or 0.
+    """
     if not _pictures:
         return 0
     try:
@@ -26,16 +37,34 @@ def of_plate(path: Path) -> int:
     except OSError:
         return 0
     key = str(path)
-    if _written.get(key) == changed:
-        return _pictures[0][key].icon_id if key in _pictures[0] else 0
-    _written[key] = changed
+    if _written.get(key) != changed and key not in _reading:
+        _written[key] = changed
+        _reading.add(key)
+        threading.Thread(target=_read, args=(path, key), daemon=True).start()
+        if not bpy.app.timers.is_registered(_show):
+            bpy.app.timers.register(_show, first_interval=_EVERY)
+    return _pictures[0][key].icon_id if key in _pictures[0] else 0
+
+
+def _read(path: Path, key: str) -> None:
+    """Read a plate and make it small, in a thread."""
     try:
-        pixels = next(iter(exr.read(path).values()))
+        _read_ones.put((key, displayed(next(iter(exr.read(path).values())))))
     except ArtoError:
-        return 0
-    if key in _pictures[0]:
-        del _pictures[0][key]
-    return _put(key, displayed(pixels))
+        _read_ones.put((key, None))
+
+
+def _show() -> float | None:
+    """Put what was read into icons, and draw the panels again."""
+    while not _read_ones.empty():
+        key, picture = _read_ones.get()
+        _reading.discard(key)
+        if picture is not None and _pictures:
+            if key in _pictures[0]:
+                del _pictures[0][key]
+            _put(key, picture)
+            watch.redraw()
+    return _EVERY if _reading else None
 
 
 def _put(key: str, picture: NDArray[np.float32]) -> int:
@@ -88,6 +117,9 @@ def register() -> None:
 
 
 def unregister() -> None:
+    if bpy.app.timers.is_registered(_show):
+        bpy.app.timers.unregister(_show)
     _written.clear()
+    _reading.clear()
     while _pictures:
         bpy.utils.previews.remove(_pictures.pop())
