@@ -118,13 +118,22 @@ def show_looks(job: SecondBlender) -> str:
 
 def show_verified(job: SecondBlender) -> str:
     """Show the picture of where the plate differs from the render."""
-    scene = _scene_of(job)
-    path = Path(job.state.result)
-    if scene is not None and path == verify_file(relit_file(scene)):
-        window = bpy.context.window_manager.windows[0]
-        with bpy.context.temp_override(window=window):
-            reveal(show(path, "ARTO Verify"))
+    _show_beside(job, verify_file, lambda _: "ARTO Verify")
     return job.state.text
+
+
+def _show_beside(
+    job: SecondBlender, beside: Callable[[Path], Path], named: Callable[[bpy.types.Scene], str]
+) -> None:
+    """Show what a job has made beside the plate that the scene has now; else nothing.
+
+    beside: where that is, by the plate's path; named: the name of its image.
+    """
+    scene, path = _scene_of(job), Path(job.state.result)
+    if scene is None or path != beside(relit_file(scene)):
+        return
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+        reveal(show(path, named(scene)))
 
 
 def show_sheet(job: SecondBlender) -> str:
@@ -141,12 +150,8 @@ def show_sheet(job: SecondBlender) -> str:
 
 def show_finished(job: SecondBlender) -> str:
     """Show the picture that plate and samples make together."""
-    scene = _scene_of(job)
     path = Path(job.state.result)
-    if scene is not None and path == finished_file(relit_file(scene)):
-        window = bpy.context.window_manager.windows[0]
-        with bpy.context.temp_override(window=window):
-            reveal(show(path, f"{name_of(scene)} {FINISHED}"))
+    _show_beside(job, finished_file, lambda scene: f"{name_of(scene)} {FINISHED}")
     return f"finished with {exr.header(path).get(SAID, '')}" if path.is_file() else job.state.text
 
 
