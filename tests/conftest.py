@@ -25,6 +25,27 @@ def own_modules() -> Path:
 open_image_io.imported([own_modules()])
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Make a scene anew that tests share, where a test between them has opened another file.
+
+    Workers take tests from each other, so those of a module run in any order.
+    """
+    for *_, fixture in item._fixtureinfo.name2fixturedefs.values():  # type: ignore[attr-defined]
+        if fixture.cached_result is not None and _is_removed(fixture.cached_result[0]):
+            fixture.finish(item._request)  # type: ignore[attr-defined]
+
+
+def _is_removed(value: object) -> bool:
+    """Whether a value is a scene that is not in Blender any more."""
+    if type(value).__name__ != "Scene":
+        return False
+    try:
+        return not value.name  # type: ignore[attr-defined]
+    except ReferenceError:
+        return True
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """What is in the real program comes first: these are the longest tests, and none of them should
     be left alone at the end of a run of several workers."""

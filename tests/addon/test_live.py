@@ -248,6 +248,7 @@ def test_a_killed_blender_is_said_and_another_one_is_started(scene, made) -> Non
 
 def test_no_room_for_the_worlds_file(scene, made, tmp_path) -> None:
     """A sentence, and it goes on once there is room again."""
+    resident.current().begin()
     folder, made._sent._folder = made._sent._folder, tmp_path / "gone" / "far"
     with pytest.raises(SceneError, match="cannot be written"):
         made.ask(scene, scene.view_layers[0].name, scene.world, "one", False)
