@@ -38,7 +38,7 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 def _is_removed(value: object) -> bool:
     """Whether a value is a scene that is not in Blender any more."""
-    if type(value).__name__ != "Scene":
+    if type(value).__name__ != "Scene" or not hasattr(type(value), "bl_rna"):
         return False
     try:
         return not value.name  # type: ignore[attr-defined]
